@@ -165,7 +165,7 @@ def equal(one, other, low, high, gaussian):
     return brentq(gap, low, high, xtol=1e-9)
 
 
-@RECIPES.of("binary-fig5-9/crossing")
+@RECIPES.of("binary-fig5-9/snr_db")
 def fig59(row):
     return equal((4, 5, 6), (4, 6, 7), 4.5, 5.8, True) if row.startswith("{4,5,6}") else equal((4, 6, 7), GRAY[3], 5.5, 7, True)
 
@@ -182,7 +182,7 @@ RECIPES.of("binary-fig5-9/dr_print")(lambda row: rate_distortion(0.1 * 10**0.5))
 RECIPES.of("binary-fig5-9/dr_per_n")(lambda row: rate_distortion(0.1 * 10**0.5 / 3))
 
 
-@RECIPES.of("binary-table5-2/mmse")
+@RECIPES.of("binary-table5-2/mse_mmse")
 def table52(row):
     s = Source(5.2, 3, True)
     if row == "printed":
@@ -238,7 +238,7 @@ def table51(row):
 RECIPES.of("binary-table5-1/rank")(lambda row: [m for _, m in eight()].index(tuple(sorted(PRINTED51))))
 RECIPES.of("binary-table5-1/mse_dmap", "printed")(lambda row: Fine(18.2).dmap(PRINTED51))
 RECIPES.of("binary-table5-1/mse_dmap")(lambda row: eight_dmap()[0][0])
-RECIPES.of("binary-table5-1/rank-dmap")(lambda row: [m for _, m in eight_dmap()].index(tuple(sorted(PRINTED51))))
+RECIPES.of("binary-table5-1/rank_dmap")(lambda row: [m for _, m in eight_dmap()].index(tuple(sorted(PRINTED51))))
 
 
 @RECIPES.of("binary-fig5-2/mse")
@@ -261,7 +261,7 @@ def strategy3(row):
     return s.mse(GRAY[3] + (extra,) * 5) / eight(numbers(row)[1])[0][0]
 
 
-@RECIPES.of("binary-fig5-7/special")
+@RECIPES.of("binary-fig5-7/value")
 def special(row):
     if row.startswith("Gray crosses"):
         return equal(GRAY[3], (4, 5, 6), 7, 9, False)
@@ -284,7 +284,7 @@ def descent(source, masks, banned=()):
     return source.mse(masks), tuple(masks)
 
 
-@RECIPES.of("binary-fig5-7/tiling")
+@RECIPES.of("binary-fig5-7/mse")
 def tiling(row):
     s = Source(18.2)
     if row.startswith("best"):
@@ -296,6 +296,6 @@ def tiling(row):
 
 # Figure 5.8
 
-RECIPES.of("binary-fig5-8/as-printed")(lambda row: Fine(float(row[:-3]), 3, True).dmap(GRAY[3], True))
-RECIPES.of("binary-fig5-8/corrected")(lambda row: Fine(float(row[:-3]), 3, True).dmap(GRAY[3]))
+RECIPES.of("binary-fig5-8/dmap_print")(lambda row: Fine(float(row[9:-3]), 3, True).dmap(GRAY[3], True))
+RECIPES.of("binary-fig5-8/dmap")(lambda row: Fine(float(row[9:-3]), 3, True).dmap(GRAY[3]))
 RECIPES.of("binary-fig5-8/crlb")(lambda row: Source(float(row[:-3])).bound(GRAY[3]))

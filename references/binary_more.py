@@ -13,7 +13,7 @@ from binary import GRAY, RECIPES, Source, descent
 from common import phi
 
 
-@RECIPES.of("binary-fig5-8/tightness")
+@RECIPES.of("binary-fig5-8/ratio")
 def tightness(row):
     """-q'' + J(x) q = 1, q(-1) = q(1) = 0; the bound is the mean of q. Second differences, extrapolated to step 0."""
     source = Source(float(row[:-3]))

@@ -135,8 +135,8 @@ def rate(count):
 
 def three(figure, pattern, simulate):
     """Position, velocity and rate of `simulate(row)`."""
-    RECIPES.of(f"{figure}/position", pattern)(lambda row: rmse(simulate(row)["errors"][:, :, 0]))
-    RECIPES.of(f"{figure}/velocity", pattern)(lambda row: rmse(simulate(row)["errors"][:, :, 1]))
+    RECIPES.of(f"{figure}/position_rmse", pattern)(lambda row: rmse(simulate(row)["errors"][:, :, 0]))
+    RECIPES.of(f"{figure}/velocity_rmse", pattern)(lambda row: rmse(simulate(row)["errors"][:, :, 1]))
     RECIPES.of(f"{figure}/rate", pattern)(lambda row: rate(simulate(row)["count"]))
 
 

@@ -128,11 +128,12 @@ def plant(row):
 
 # Figures 3 to 5
 
-RECIPES.of("dymbo-fig3/kf")(lambda row: steady(*numbers(row), 1.0))
-RECIPES.of("dymbo-fig4/double-riccati")(lambda row: brentq(lambda g: loss(float(row), g) - 2, 1e-3, 50, xtol=1e-14))
-RECIPES.of("dymbo-fig4/exact")(lambda row: exact(*numbers(row)) / steady(*numbers(row), 1.0))
-RECIPES.of("dymbo-fig4/double-exact")(
-    lambda row: brentq(lambda g: exact(float(row), g) / steady(float(row), g, 1.0) - 2, 0.5, 1.5, xtol=1e-9))
+RECIPES.of("dymbo-fig3/kf_reduction")(lambda row: steady(*numbers(row), 1.0))
+RECIPES.of("dymbo-fig4/gamma", "^riccati")(
+    lambda row: brentq(lambda g: loss(float(row.split()[-1]), g) - 2, 1e-3, 50, xtol=1e-14))
+RECIPES.of("dymbo-loss/exact")(lambda row: exact(*numbers(row)) / steady(*numbers(row), 1.0))
+RECIPES.of("dymbo-fig4/gamma", "^exact")(
+    lambda row: brentq(lambda g: exact(float(row.split()[-1]), g) / steady(float(row.split()[-1]), g, 1.0) - 2, 0.5, 1.5, xtol=1e-9))
 
 
 @RECIPES.of("dymbo-fig5/dymbo_exact")
@@ -241,7 +242,7 @@ def distance(row):
     return -minimize_scalar(lambda t: -gap(t), bounds=(best - 0.01, best + 0.01), method="bounded", options={"xatol": 1e-9}).fun
 
 
-@RECIPES.of("dymbo-prop2/exact")
+@RECIPES.of("dymbo-prop2/exact_sup")
 def proposition2(row):
     """Largest mean squared error of the first message: the state midway between two levels."""
     tau = float(row)
@@ -249,14 +250,15 @@ def proposition2(row):
     return np.sum((k * tau - tau / 2) ** 2 * between((k - 1) * tau, k * tau))
 
 
-@RECIPES.of("dymbo-prop2/first-bit")
+@RECIPES.of("dymbo-prop2/mse")
 def first_bit(row):
     return course(0.9, numbers(row)[0], 2.25 if row.startswith("printed") else FIRST)[1]
 
 
-@RECIPES.of("dymbo-prop2/cautious")
+@RECIPES.of("dymbo-prop2/nees")
 def cautious(row):
-    return course(0.9, 0.5, 2.25)[int(row)] / variances(0.9, 0.5, 2.25, 5)[int(row)]
+    step = int(row.split()[-1])
+    return course(0.9, 0.5, 2.25)[step] / variances(0.9, 0.5, 2.25, 5)[step]
 
 
 # Threshold of (14) as printed (erratum dymbo-1)
@@ -303,7 +305,7 @@ def threshold_excess(row):
 
 
 RECIPES.of("dymbo-escape/riccati")(lambda row: steady(*numbers(row)))
-RECIPES.of("dymbo-threshold/nees")(lambda row: exact(*numbers(row)) / steady(*numbers(row)))
+RECIPES.of("dymbo-threshold/nees")(lambda row: exact(*numbers(row)[:2]) / steady(*numbers(row)[:2]))
 
 
 @RECIPES.of("dymbo-escape/escaped")

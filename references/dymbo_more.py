@@ -141,7 +141,7 @@ def information(bits):
     return between(e[:-1], e[1:]) @ centroids**2
 
 
-RECIPES.of("dymbo-bits/information")(lambda row: information(int(row)))
+RECIPES.of("dymbo-bits/c")(lambda row: information(int(row.split()[-1])))
 
 
 @lru_cache(None)

@@ -232,9 +232,9 @@ def register(figure, most):
             return mean_and_error(f(handovers(kernel, most, "ml")[:, : int(t[1:]), 1].sum(1)))
         return recipe
 
-    RECIPES.of(f"{figure}/ml-bound")(ml_bound)
-    RECIPES.of(f"{figure}/log10-kl")(printed("kl", 1))
-    RECIPES.of(f"{figure}/log10-l1")(printed("l1", 2))
+    RECIPES.of(f"{figure}/ml_printed")(ml_bound)
+    RECIPES.of(f"{figure}/log10_kl_printed")(printed("kl", 1))
+    RECIPES.of(f"{figure}/log10_l1_printed")(printed("l1", 2))
     RECIPES.of(f"{figure}/l1-from-dr")(from_dr(lambda total: 2 * np.tanh(total / 2)))
     RECIPES.of(f"{figure}/kl-from-dr")(from_dr(lambda total: phi_bound(2 * total)))
 

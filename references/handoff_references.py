@@ -71,19 +71,19 @@ def of(name):
     return increases("kl", 1) if name == "gauss" else increases(name, 5)
 
 
-@RECIPES.of("handoff-fig6c/kl", "^(ml|kl|l1|gauss)-")
+@RECIPES.of("handoff-fig6c/kl_increase", "^(ml|kl|l1|gauss)-")
 def after(row):
     name, t = row.split("-t")
     return mean_and_error(of(name)[:, TIMES.index(int(t)), 0])
 
 
-@RECIPES.of("handoff-fig6c/before", "^(ml|kl|l1)-")
+@RECIPES.of("handoff-fig6c/before_reduction", "^(ml|kl|l1)-")
 def before(row):
     name, t = row.split("-t")
     return mean_and_error(of(name)[:, TIMES.index(int(t)), 1])
 
 
-@RECIPES.of("handoff-fig6c/difference")
+@RECIPES.of("handoff-fig6c/kl")
 def difference(row):
     one, other, t = row.split("-")
     return mean_and_error(of(one)[:, TIMES.index(int(t[1:])), 0] - of(other)[:, TIMES.index(int(t[1:])), 0])

@@ -273,6 +273,9 @@ def chain43():
     return found, NINE.w @ NINE.x**2 - np.sum(first**2 / total)
 
 
+RECIPES.of("mi-table4-3/t", r"^mi \d$")(lambda row: chain43()[0][int(row[3:]) - 1])
+
+
 @RECIPES.of("mi-table4-3/t")
 def t43(row):
     given = {"mi-printed": 1.275, "lloyd-printed": 0.982, "lloyd-x": lloyd(4)[-1], "lloyd-y": np.sqrt(2) * lloyd(4)[-1]}
@@ -280,10 +283,9 @@ def t43(row):
 
 
 RECIPES.of("mi-table4-3/mse", "mi-greedy")(lambda row: chain43()[1])
+RECIPES.of("mi-table4-3/mse", "^ceo$")(lambda row: one_rate(9, np.log(4)))
 RECIPES.of("mi-table4-3/mse")(lambda row: nine("mse", t43(row)))
 RECIPES.of("mi-table4-3/mi_nats")(lambda row: nine("mi", t43(row)))
-RECIPES.of("mi-table4-3/chain")(lambda row: chain43()[0][int(row) - 1])
-RECIPES.of("mi-table4-3/bound")(lambda row: one_rate(9, np.log(4)))
 
 
 def one_rate(sensors, rate):
@@ -377,7 +379,7 @@ def row45(row):
 
 RECIPES.of("mi-table4-5/mse")(lambda row: row45(row)[0].value("mse", row45(row)[1]))
 RECIPES.of("mi-table4-5/outer2")(lambda row: row45(row)[1][1][-1])
-RECIPES.of("mi-table4-5-mismatch/at-printed")(
+RECIPES.of("mi-table4-5-mismatch/mse", "^[a-z]+$")(
     lambda row: Sensors(channel=words(0.05, LABELS[row])).value("mse", [symmetric([1.37])] * 2))
 
 

@@ -309,8 +309,8 @@ def by_loading(row):
 for what in ("mse", "median", "lost"):
     for figure in ("mpa-table3-mse", "mpa-fig3-4", "mpa-fig3-5", "mpa-table3-low"):
         register(figure, what, r"^\d+dB-L\d+ " + METHODS, plain)
-    register("mpa-table3-mse", "speed-" + what, "", by_speed)
-    register("mpa-table3-mse", "layout-" + what, METHODS, by_layout)
+    register("mpa-table3-mse", what, "^V", by_speed)
+    register("mpa-table3-mse", what, r"^layout\d " + METHODS, by_layout)
     register("mpa-table3-mse", "floor-" + what, METHODS, plain)
+    register("mpa-encoder", what, r"^(\d|best)", by_loading)
     register("mpa-encoder", what, "", by_encoder)
-    register("mpa-encoder", "loading-" + what, "", by_loading)

@@ -103,9 +103,6 @@ pub enum Error {
     /// A plot could not be drawn.
     #[error(transparent)]
     Draw(#[from] fewbits_plot::Error),
-    /// The gallery cannot be served.
-    #[error("cannot serve the gallery: {0}")]
-    Serve(Box<dyn std::error::Error + Send + Sync>),
     /// The thread pool could not be started.
     #[error("cannot start threads: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),

@@ -105,12 +105,14 @@ macro_rules! limits {
 
 /// Structs of rows, and structs of lists of them ([`Field`](crate::schema::Field)): the fields are the columns, each with its unit
 /// and its meaning behind its type. The meaning is the field's documentation; one that is longer than a line may stand above the
-/// field instead. A row that is compared with references says by which of its fields it is found: `struct Row by "{distance} m"`.
-/// Each column of such rows that has references under its own name is compared with them, without a word in the claims.
+/// field instead. A row that is compared with references says by which of its fields it is found: `struct Row by "{distance} m"`, or
+/// by a function of the row, `struct Row by name`. Each column of such rows that has references under its own name is compared with
+/// them, without a word in the claims; behind `by "{distance} m" at full_trials` no plain averages are, with fewer trials undecided.
 ///
 /// What a field is in the default plot stands behind its type and unit, with what it is called there: `as panel("ratio {}")`,
-/// `as x("time t")`, `as key`, `as line("exact")`, `as dashed("bound")`, `as points("simulated")`, `as curve("mean")`.
-/// [`figure!`](crate::figure!) then draws the rows.
+/// `as x("time t")`, `as key`, `as line("exact")`, `as dashed("bound")`, `as points("simulated")`, `as curve("mean")`. Where there
+/// are several panels of one horizontal axis, `as line("exact") in errors` names those of the column. A row within a row has one
+/// role, and a `{}` for each of its columns. [`figure!`](crate::figure!) then draws the rows.
 ///
 /// ```
 /// fewbits_experiments::rows! {
@@ -124,14 +126,17 @@ macro_rules! limits {
 /// ```
 #[macro_export]
 macro_rules! rows {
-    (@fields $name:ident [$($key:literal)?] $($field:ident: $type:ty [$($unit:tt)?] [$($role:ident $($label:literal)?)?] $meaning:expr,)*) => {
+    (@fields $name:ident [$($key:tt $($effort:ident)?)?]
+        $($field:ident: $type:ty [$($unit:tt)?] [$($role:ident $($label:literal)? [$($panel:ident)*])?] $meaning:expr,)*) => {
         impl $crate::schema::Field for $name {
-            fn describe(_: $crate::Column, to: &mut $crate::schema::Described) {
+            fn describe(row: $crate::Column, to: &mut $crate::schema::Described) {
+                let first = to.described();
                 $(<$type as $crate::schema::Field>::describe(
                     $crate::Column::of(stringify!($field), concat!("" $(, $unit)?), $meaning)
-                        $(.drawn($crate::role!($role), concat!("" $(, $label)?)))?,
+                        $(.drawn($crate::role!($role), concat!("" $(, $label)?), &[$(stringify!($panel)),*]))?,
                     to,
                 );)*
+                to.draw(first, row);
             }
 
             fn put(&self, to: &mut $crate::schema::Cells) {
@@ -139,12 +144,23 @@ macro_rules! rows {
             }
 
             $(fn found_by(&self) -> Option<String> {
-                const _: &str = $key;
+                const _: &str = stringify!($key);
                 Some($crate::claim::Keyed::key(self))
-            })?
+            }
+
+            $(fn at_full_trials() -> bool {
+                $crate::effort!($effort)
+            })?)?
         }
     };
     (@keyed $name:ident [] [$($field:ident)*]) => {};
+    (@keyed $name:ident [$key:ident] [$($field:ident)*]) => {
+        impl $crate::claim::Keyed for $name {
+            fn key(&self) -> String {
+                $key(self)
+            }
+        }
+    };
     (@keyed $name:ident [$key:literal] [$($field:ident)*]) => {
         impl $crate::claim::Keyed for $name {
             #[allow(unused_variables)]
@@ -156,9 +172,9 @@ macro_rules! rows {
     };
     ($(
         $(#[$outer:meta])*
-        $visible:vis struct $name:ident $(by $key:literal)? {
-            $($(#[doc = $doc:literal])* $shown:vis $field:ident: $type:ty $([$unit:tt])? $(as $role:ident $(($label:literal))?)?
-                $(=> $meaning:literal)?,)*
+        $visible:vis struct $name:ident $(by $key:tt $(at $effort:ident)?)? {
+            $($(#[doc = $doc:literal])* $shown:vis $field:ident: $type:ty $([$unit:tt])?
+                $(as $role:ident $(($label:literal))? $(in $($panel:ident)+)?)? $(=> $meaning:literal)?,)*
         }
     )*) => {$(
         $crate::rows! { @keyed $name [$($key)?] [$($field)*] }
@@ -167,8 +183,20 @@ macro_rules! rows {
             $($(#[doc = $doc])* $(#[doc = $meaning])? $shown $field: $type,)*
         }
 
-        $crate::rows! { @fields $name [$($key)?] $($field: $type [$($unit)?] [$($role $($label)?)?] concat!("" $(, $doc)* $(, $meaning)?),)* }
+        $crate::rows! {
+            @fields $name [$($key $($effort)?)?]
+            $($field: $type [$($unit)?] [$($role $($label)? [$($($panel)+)?])?] concat!("" $(, $doc)* $(, $meaning)?),)*
+        }
     )*};
+}
+
+/// Which trial counts the references of a row need, as [`rows!`](crate::rows!) writes it.
+#[macro_export]
+#[doc(hidden)]
+macro_rules! effort {
+    (full_trials) => {
+        true
+    };
 }
 
 /// The [`Role`](crate::schema::Role) of a column as [`rows!`](crate::rows!) writes it.
@@ -204,16 +232,30 @@ macro_rules! role {
 /// `figure!(Parameters => Vec<Row>, "demo-fig1", "Averages", "the paper, figure 1", "What it shows.");`
 ///
 /// With the axes behind the caption, `"What it shows."; semilog("error / m")` (or `linear`, `loglog`), it also draws the first table
-/// whose columns have roles ([`rows!`](crate::rows!)).
+/// whose columns have roles ([`rows!`](crate::rows!)); with several panels, `"What it shows."; { errors: semilog("error / m", "Errors"),
+/// rates: linear("rate") }`, each draws the columns that name it, under its title.
 ///
-/// Where many figures are values of one type, a field says what stands above: `figure!(Parameters => Vec<Row>, about);`.
+/// Where many figures are values of one type, a field says what stands above: `figure!(Parameters => Vec<Row>, about);`, with axes
+/// behind it as well.
 #[macro_export]
 macro_rules! figure {
     ($parameters:ty => $tables:ty, $id:expr, $title:literal, $source:literal, $caption:literal; $panel:ident($y:expr)) => {
         $crate::figure!($parameters => $tables, $id, $title, $source, $caption);
 
         fn plot(&self, _: &Self::Parameters, tables: &Self::Tables) -> $crate::plot::Plot {
-            $crate::plotted(tables, $title, |title, x| $crate::plot::Panel::$panel(title, x, $y))
+            $crate::plotted(tables, $title, &[("", "", &|title, x| $crate::plot::Panel::$panel(title, x, $y))])
+        }
+    };
+    ($parameters:ty => $tables:ty, $id:expr, $title:literal, $source:literal, $caption:literal;
+        { $($name:ident: $panel:ident($y:expr $(, $heading:literal)?)),+ $(,)? }) => {
+        $crate::figure!($parameters => $tables, $id, $title, $source, $caption);
+
+        fn plot(&self, _: &Self::Parameters, tables: &Self::Tables) -> $crate::plot::Plot {
+            $crate::plotted(tables, $title, &[$((
+                stringify!($name),
+                concat!("" $(, $heading)?),
+                &|title, x| $crate::plot::Panel::$panel(title, x, $y),
+            )),+])
         }
     };
     ($parameters:ty => $tables:ty, $id:expr, $title:literal, $source:literal, $caption:literal) => {
@@ -222,6 +264,13 @@ macro_rules! figure {
 
         fn about(&self) -> $crate::About {
             $crate::About::of($id, $title, $source).showing($caption)
+        }
+    };
+    ($parameters:ty => $tables:ty, $about:ident; $panel:ident($y:expr)) => {
+        $crate::figure!($parameters => $tables, $about);
+
+        fn plot(&self, _: &Self::Parameters, tables: &Self::Tables) -> $crate::plot::Plot {
+            $crate::plotted(tables, self.$about.title, &[("", "", &|title, x| $crate::plot::Panel::$panel(title, x, $y))])
         }
     };
     ($parameters:ty => $tables:ty, $about:ident) => {

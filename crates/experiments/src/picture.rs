@@ -3,44 +3,43 @@
 use crate::schema::{Column, Field, Role, Table, Value};
 use fewbits_plot::{Axis, Layer, Panel, Plot};
 
-/// The first table that has a horizontal axis: a panel for each value of its panel column (the title without one), a curve for each drawn
-/// column and each value of its key columns. Curves of one key have one colour; without keys each column has its own.
-pub fn plotted<T: Field>(tables: &T, title: &str, panel: impl Fn(String, String) -> Panel) -> Plot {
+/// A panel by the name that its columns give it (none for the only one), its heading, and its axes from a title and the name of the
+/// horizontal one.
+pub type Named<'a> = (&'a str, &'a str, &'a dyn Fn(String, String) -> Panel);
+
+/// The first table that draws one of these panels: each of them for each value of its panel column (the figure's title without heading
+/// and value), a curve for each drawn column and each value of its key columns. Then the next table. Curves of one key have one colour;
+/// without keys each column has its own, but a line and the marks that are called the same up to a comma.
+pub fn plotted<T: Field>(tables: &T, title: &str, named: &[Named<'_>]) -> Plot {
     // A cell that is not finite is refused where the tables are written.
     let tables = Table::of(tables).unwrap_or_default();
-    let with_axis = |table: &&Table| table.columns.iter().any(|column| column.role == Role::X);
-    let Some(table) = tables.iter().find(with_axis) else {
-        return Plot::grid(1, Vec::new());
-    };
-    let picture = Picture::of(table);
-    let panels: Vec<String> = picture.values_of(Role::Panel, &table.rows);
-    let drawn = |value: &String| {
-        let rows: Vec<&Vec<Value>> = table
-            .rows
-            .iter()
-            .filter(|row| picture.value(Role::Panel, row) == *value)
-            .collect();
-        let title = if value.is_empty() { title } else { value };
-        let mut panel = panel(title.to_owned(), picture.named(Role::X));
-        if !picture.places.is_empty() {
-            panel.x = Axis::categories(panel.x.label, &picture.places);
+    let mut panels = Vec::new();
+    for table in &tables {
+        let pictures = named.iter().map(|named| Picture::of(table, named));
+        let pictures: Vec<Picture<'_>> = pictures.filter(Picture::is_drawn).collect();
+        for value in pictures
+            .first()
+            .map_or_else(Vec::new, |first| first.values_of(Role::Panel, &table.rows))
+        {
+            panels.extend(pictures.iter().map(|picture| picture.panel(title, &value)));
         }
-        panel.with_all(picture.layers(&rows))
-    };
-    Plot::grid(2, panels.iter().map(drawn).collect())
+    }
+    Plot::grid(2, panels)
 }
 
-/// A table and the places of its words on the horizontal axis.
+/// A table, the panel of it that is drawn, and the places of its words on the horizontal axis.
 struct Picture<'a> {
     table: &'a Table,
+    named: Named<'a>,
     /// What stands on a horizontal axis of words, in order; empty for numbers.
     places: Vec<String>,
 }
 
 impl<'a> Picture<'a> {
-    fn of(table: &'a Table) -> Self {
+    fn of(table: &'a Table, named: &Named<'a>) -> Self {
         let mut picture = Self {
             table,
+            named: *named,
             places: Vec::new(),
         };
         let words = |row: &Vec<Value>| {
@@ -54,6 +53,44 @@ impl<'a> Picture<'a> {
         picture
     }
 
+    /// The columns that this panel draws.
+    fn drawn(&self) -> Vec<usize> {
+        let is_drawn = |column: &Column| {
+            let here = match column.panels {
+                [] => self.named.0.is_empty(),
+                panels => panels.contains(&self.named.0),
+            };
+            here && matches!(column.role, Role::Line | Role::Dashed | Role::Points | Role::Curve)
+        };
+        let columns = self.table.columns.iter().enumerate();
+        columns.filter(|(_, column)| is_drawn(column)).map(|(i, _)| i).collect()
+    }
+
+    /// Whether there is a horizontal axis and a column to draw.
+    fn is_drawn(&self) -> bool {
+        self.table.columns.iter().any(|column| column.role == Role::X) && !self.drawn().is_empty()
+    }
+
+    /// The panel of one value of the panel columns.
+    fn panel(&self, title: &str, value: &str) -> Panel {
+        let rows = self
+            .table
+            .rows
+            .iter()
+            .filter(|row| self.value(Role::Panel, row) == *value);
+        let (_, heading, panel) = self.named;
+        let words: Vec<&str> = [heading, value].into_iter().filter(|word| !word.is_empty()).collect();
+        let title = match (words.as_slice(), self.named.0) {
+            ([], "") => title.to_owned(),
+            (words, _) => words.join(", "),
+        };
+        let mut panel = panel(title, self.named(Role::X));
+        if !self.places.is_empty() {
+            panel.x = Axis::categories(panel.x.label, &self.places);
+        }
+        panel.with_all(self.layers(&rows.collect::<Vec<_>>()))
+    }
+
     /// The columns of this role and a row's cells in them.
     fn cells<'r>(&'r self, role: Role, row: &'r [Value]) -> impl Iterator<Item = (&'r Column, &'r Value)> {
         self.table
@@ -63,13 +100,24 @@ impl<'a> Picture<'a> {
             .filter(move |(column, _)| column.role == role)
     }
 
-    /// What the columns of this role say of a row, in words: `{}` of their names is the value.
+    /// What the columns of this role say of a row, in words: each `{}` of a name is a value.
     fn value(&self, role: Role, row: &[Value]) -> String {
-        let words = self.cells(role, row).map(|(column, cell)| match (role, column.label) {
-            (Role::X, _) | (_, "") => cell.to_string(),
-            (_, label) => label.replace("{}", &cell.to_string()),
-        });
-        words.collect::<Vec<_>>().join(", ")
+        let mut cells = self.cells(role, row);
+        let mut words = Vec::new();
+        while let Some((column, cell)) = cells.next() {
+            let label = match (role, column.label.as_str()) {
+                (Role::X, _) | (_, "") => "{}",
+                (_, label) => label,
+            };
+            let mut word = label.replacen("{}", &cell.to_string(), 1);
+            while word.contains("{}")
+                && let Some((_, cell)) = cells.next()
+            {
+                word = word.replacen("{}", &cell.to_string(), 1);
+            }
+            words.push(word);
+        }
+        words.join(", ")
     }
 
     /// The different values of the columns of this role, in order of appearance.
@@ -84,10 +132,24 @@ impl<'a> Picture<'a> {
     }
 
     fn layers(&self, rows: &[&Vec<Value>]) -> Vec<Layer> {
-        let is_drawn = |role| matches!(role, Role::Line | Role::Dashed | Role::Points | Role::Curve);
-        let columns = &self.table.columns;
-        let drawn: Vec<usize> = (0..columns.len()).filter(|i| is_drawn(columns[*i].role)).collect();
+        let (columns, drawn) = (&self.table.columns, self.drawn());
         let keys = crate::sweep::distinct(rows, |row| self.value(Role::Key, row));
+        // The line `Kalman, exact` and the marks `Kalman, simulated` have one colour.
+        let mut kinds: Vec<(String, Vec<Role>)> = Vec::new();
+        let colours = drawn.iter().map(|i| {
+            let kind = name(&columns[*i]).split(',').next().unwrap_or_default().to_owned();
+            let role = columns[*i].role;
+            let place = kinds
+                .iter()
+                .position(|(known, roles)| *known == kind && !roles.contains(&role));
+            let place = place.unwrap_or(kinds.len());
+            if place == kinds.len() {
+                kinds.push((kind, Vec::new()));
+            }
+            kinds[place].1.push(role);
+            place
+        });
+        let colours: Vec<usize> = colours.collect();
         let mut layers = Vec::new();
         for (place, key) in keys.iter().enumerate() {
             let own: Vec<&[Value]> = rows
@@ -95,13 +157,13 @@ impl<'a> Picture<'a> {
                 .filter(|row| self.value(Role::Key, row) == *key)
                 .map(|row| &row[..])
                 .collect();
-            for (order, &i) in drawn.iter().enumerate() {
+            for (&i, &kind) in drawn.iter().zip(&colours) {
                 let label = match (key.as_str(), drawn.len()) {
                     ("", _) => name(&columns[i]),
                     (key, 1) => key.to_owned(),
                     (key, _) => format!("{}, {key}", name(&columns[i])),
                 };
-                let colour = if keys.len() > 1 { place } else { order };
+                let colour = if keys.len() > 1 { place } else { kind };
                 let drawn = self.layer(label, i, &own);
                 layers.extend(drawn.into_iter().map(|layer| layer.coloured(colour)));
             }
@@ -148,7 +210,7 @@ impl<'a> Picture<'a> {
 /// The label, or the meaning without its full stop and with the unit.
 fn name(column: &Column) -> String {
     let meaning = column.meaning.trim_end_matches('.');
-    match (column.label, column.unit) {
+    match (column.label.as_str(), column.unit) {
         ("", "") => meaning.to_owned(),
         ("", unit) => format!("{meaning} / {unit}"),
         (label, _) => label.to_owned(),
@@ -185,6 +247,49 @@ mod tests {
         }
     }
 
+    parameters! {
+        #[derive(Clone, Copy)]
+        point struct Plant {
+            a: f64 => "Coefficient.",
+            q: f64 => "Variance.",
+        }
+    }
+
+    rows! {
+        struct Both {
+            plant: Plant as panel("a = {}, q = {}"),
+            time: f64 as x("time") => "Time.",
+            rate: f64 as line("rate") in rates => "Rate.",
+            error: f64 as points("error") in errors => "Error.",
+            bound: f64 as dashed("bound") in errors rates => "Bound.",
+            each: [f64; 2] as line("sensor {}") in rates => "Of each.",
+        }
+    }
+
+    #[test]
+    fn columns_name_their_panels_and_a_row_within_has_one_role() {
+        let row = |time: f64| Both {
+            plant: Plant { a: 0.5, q: 2.0 },
+            time,
+            rate: 1.0,
+            error: 2.0,
+            bound: 3.0,
+            each: [4.0, 5.0],
+        };
+        let rates = |title, x| Panel::linear(title, x, "rate");
+        let errors = |title, x| Panel::semilog(title, x, "error");
+        let plot = plotted(&vec![row(1.0), row(2.0)], "title", &[("errors", "Errors", &errors), ("rates", "", &rates)]);
+        let said = plot.panels.iter().map(|panel| {
+            let labels = panel.layers.iter().map(|layer| layer.label.as_str());
+            (panel.title.as_str(), labels.collect::<Vec<_>>())
+        });
+        let expected = [
+            ("Errors, a = 0.5, q = 2", vec!["error", "bound"]),
+            ("a = 0.5, q = 2", vec!["rate", "bound", "sensor 1", "sensor 2"]),
+        ];
+        assert_eq!(said.collect::<Vec<_>>(), expected);
+    }
+
     fn rows(worlds: &[&'static str], schemes: &[&'static str]) -> Vec<Row> {
         let mut rows = Vec::new();
         for &world in worlds {
@@ -207,8 +312,11 @@ mod tests {
 
     #[test]
     fn roles_say_panels_curves_and_axes() {
-        let plot =
-            plotted(&rows(&["one", "two"], &["a", "b"]), "title", |title, x| Panel::semilog(title, x, "error / m"));
+        let plot = plotted(
+            &rows(&["one", "two"], &["a", "b"]),
+            "title",
+            &[("", "", &|title, x| Panel::semilog(title, x, "error / m"))],
+        );
         let titles: Vec<&str> = plot.panels.iter().map(|panel| panel.title.as_str()).collect();
         assert_eq!(titles, ["world one", "world two"]);
         assert_eq!(plot.panels[0].x.label, "Time / s");
@@ -235,7 +343,7 @@ mod tests {
     #[test]
     fn without_keys_each_column_has_its_colour_and_words_are_places() {
         let rows = vec![Named { method: "x", cost: 1.0 }, Named { method: "y", cost: 2.0 }];
-        let plot = plotted(&rows, "Costs", |title, x| Panel::linear(title, x, ""));
+        let plot = plotted(&rows, "Costs", &[("", "", &|title, x| Panel::linear(title, x, ""))]);
         assert_eq!(plot.panels[0].title, "Costs");
         let names: Vec<&str> = plot.panels[0].x.names.iter().map(|(_, name)| name.as_str()).collect();
         assert_eq!(names, ["x", "y"]);

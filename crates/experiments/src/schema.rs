@@ -23,7 +23,10 @@ pub struct Column {
     pub role: Role,
     /// What it is called in a plot; its meaning if empty.
     #[serde(skip)]
-    pub label: &'static str,
+    pub label: String,
+    /// The panels that it is drawn in; none for the only one.
+    #[serde(skip)]
+    pub panels: &'static [&'static str],
 }
 
 /// What a column is in the default plot ([`plotted`](crate::plotted)). [`rows!`](crate::rows!) writes it behind the type of a field.
@@ -56,14 +59,21 @@ impl Column {
             unit,
             meaning: on_one_line(documentation),
             role: Role::Data,
-            label: "",
+            label: String::new(),
+            panels: &[],
         }
     }
 
-    /// With what it is in the default plot, and what it is called there.
+    /// With what it is in the default plot, what it is called there, and in which panels.
     #[must_use]
-    pub fn drawn(self, role: Role, label: &'static str) -> Self {
-        Self { role, label, ..self }
+    pub fn drawn(self, role: Role, label: &str, panels: &'static [&'static str]) -> Self {
+        let label = label.to_owned();
+        Self {
+            role,
+            label,
+            panels,
+            ..self
+        }
     }
 }
 
@@ -114,6 +124,9 @@ pub struct Table {
     /// The key of each row, by which its references are found; none for rows without.
     #[serde(skip)]
     pub keys: Vec<Option<String>>,
+    /// Whether its references are compared with at full trial counts only.
+    #[serde(skip)]
+    pub at_full_trials: bool,
 }
 
 impl Table {
@@ -157,6 +170,28 @@ pub struct Described {
     pub(crate) tables: Vec<Table>,
 }
 
+impl Described {
+    /// Number of columns so far.
+    #[doc(hidden)]
+    pub fn described(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Gives the columns from `first` on, those of a row within a row, the role of that row.
+    #[doc(hidden)]
+    pub fn draw(&mut self, first: usize, row: Column) {
+        if row.role != Role::Data {
+            for column in &mut self.columns[first..] {
+                (column.role, column.panels) = (row.role, row.panels);
+            }
+            self.columns[first..]
+                .iter_mut()
+                .take(1)
+                .for_each(|column| column.label.clone_from(&row.label));
+        }
+    }
+}
+
 /// Rows of a table, and the reference key of each.
 pub(crate) type Keyed = (Vec<Vec<Value>>, Vec<Option<String>>);
 
@@ -181,6 +216,11 @@ pub trait Field {
     /// What a row is found by: what follows the quantity in the keys of its references.
     fn found_by(&self) -> Option<String> {
         None
+    }
+
+    /// Whether its references are compared with at full trial counts only: it is no plain average of trials.
+    fn at_full_trials() -> bool {
+        false
     }
 }
 
@@ -211,14 +251,33 @@ cells! {
     &'static str: |text| Value::Text((*text).to_owned());
 }
 
+/// Whether something is so: `yes` or `no`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Answer(pub bool);
+
+impl Field for Answer {
+    fn put(&self, to: &mut Cells) {
+        let word = if self.0 { "yes" } else { "no" };
+        word.put(to);
+    }
+}
+
+/// Several values in one cell, with blanks between them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct List<T>(pub Vec<T>);
+
+impl<T: ToString> Field for List<T> {
+    fn put(&self, to: &mut Cells) {
+        crate::sweep::joined(self.0.iter().map(T::to_string), " ").put(to);
+    }
+}
+
 impl Field for Measured {
     fn describe(about: Column, to: &mut Described) {
         let error = Column {
             name: format!("{}_se", about.name),
-            unit: about.unit,
             meaning: format!("{} (its standard error)", about.meaning),
-            role: Role::Data,
-            label: "",
+            ..Column::of("", about.unit, "")
         };
         to.columns.extend([about, error]);
     }
@@ -254,7 +313,9 @@ impl<T: Field, const N: usize> Field for [T; N] {
     fn describe(about: Column, to: &mut Described) {
         for number in 1..=N {
             let name = format!("{}{number}", about.name);
-            T::describe(Column { name, ..about.clone() }, to);
+            let label = about.label.replace("{}", &number.to_string());
+            let own = about.clone();
+            T::describe(Column { name, label, ..own }, to);
         }
     }
 
@@ -276,6 +337,7 @@ impl<T: Field> Field for Vec<T> {
             columns: columns::<T>(),
             rows: Vec::new(),
             keys: Vec::new(),
+            at_full_trials: T::at_full_trials(),
         });
     }
 
@@ -305,90 +367,4 @@ pub(crate) fn tables<T: Field>() -> Vec<Table> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    rows! {
-        struct Key {
-            method: &'static str => "How.",
-        }
-
-        struct Row {
-            key: Key,
-            time: f64 ["s"] => "Time.",
-            /// Squared error,
-            /// in square metres.
-            mse: Measured ["m^2"],
-            other: Option<Measured> => "Of another.",
-            printed: Option<f64> => "As printed.",
-        }
-
-        struct Two {
-            rows: Vec<Row> => "Main.",
-            run_times: Vec<Count> => "Counts.",
-        }
-
-        struct Count {
-            n: u64 => "A count.",
-        }
-    }
-
-    fn row(time: f64) -> Row {
-        Row {
-            key: Key { method: "lloyd" },
-            time,
-            mse: Measured::new(2.0, 0.5),
-            other: None,
-            printed: None,
-        }
-    }
-
-    #[test]
-    fn the_fields_are_the_columns() {
-        let table = Table::of(&vec![row(1.0)]).unwrap().remove(0);
-        let cells = table.columns.iter().zip(&table.rows[0]);
-        let cells: Vec<_> = cells.map(|(c, v)| format!("{}[{}]={v}", c.name, c.unit)).collect();
-        let expected = [
-            "method[]=lloyd",
-            "time[s]=1",
-            "mse[m^2]=2",
-            "mse_se[m^2]=0.5",
-            "other[]=",
-            "other_se[]=",
-            "printed[]=",
-        ];
-        assert_eq!(cells, expected);
-        assert_eq!(table.columns[3].meaning, "Squared error, in square metres. (its standard error)");
-    }
-
-    #[test]
-    fn a_struct_of_lists_is_several_tables() {
-        let two = Two {
-            rows: Vec::new(),
-            run_times: vec![Count { n: 3 }],
-        };
-        let tables = Table::of(&two).unwrap();
-        assert_eq!((tables[0].rows.len(), tables[0].columns.len()), (0, 7));
-        assert_eq!((tables[1].name.as_str(), tables[1].rows.len()), ("run-times", 1));
-    }
-
-    #[test]
-    fn a_cell_that_is_not_finite_is_refused_by_name() {
-        for bad in [f64::NAN, f64::INFINITY] {
-            let message = Table::of(&vec![row(1.0), row(bad)]).unwrap_err().to_string();
-            assert!(message.contains("`time`, row 1"), "{message}");
-        }
-    }
-
-    #[test]
-    fn arrays_are_columns_numbered_from_one() {
-        rows! {
-            struct Pair {
-                f: [f64; 2] ["V"] => "Both.",
-            }
-        }
-        let table = Table::of(&vec![Pair { f: [1.0, 2.0] }]).unwrap().remove(0);
-        let names: Vec<_> = table.columns.iter().map(|c| c.name.as_str()).collect();
-        assert_eq!(names, ["f1", "f2"]);
-    }
-}
+mod tests;

@@ -15,7 +15,7 @@
 //! | the cheapest assignment | [`assign`] |
 //!
 //! ```
-//! use fewbits_core::factor::InCell;
+//! use fewbits_core::factor::Levels;
 //! use fewbits_core::{Cell, Gaussian, Observed};
 //! use fewbits_models::{LinearSensor, constant_velocity_1d};
 //! use fewbits_multi_target::{Birth, Report, Tracker, Tracks};
@@ -29,7 +29,7 @@
 //!     tracker.predict(&motion, &mut tracks)?;
 //!     // The report is a cell of width 1; one in ten reports is false and then any of ten cells.
 //!     let place = f64::from(step);
-//!     let in_cell = Observed::new(sensor, InCell::certain(Cell::new(place - 0.5, place + 0.5)?, 0.1)?);
+//!     let in_cell = Observed::new(sensor, Levels::certain(Cell::new(place - 0.5, place + 0.5)?, 0.1)?);
 //!     tracker.update(&mut tracks, |_| 0.9, &[Report { likelihood: &in_cell, clutter: 0.1 / 10.0 }])?;
 //! }
 //! let target = tracks.confirmed(0.5).next().ok_or("no target")?;

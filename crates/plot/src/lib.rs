@@ -159,9 +159,6 @@ impl Axis {
     }
 }
 
-/// A column of rows as a curve: its entry in the legend, and its value in a row.
-pub type Curve<'a, R, Y> = (&'a str, fn(&R) -> Y);
-
 /// A pair of axes with layers on it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
@@ -199,6 +196,11 @@ impl Panel {
         Self::new(title, Axis::linear(x), Axis::log(y))
     }
 
+    /// An empty panel, its horizontal axis logarithmic.
+    pub fn semilogx(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
+        Self::new(title, Axis::log(x), Axis::linear(y))
+    }
+
     /// An empty panel, both axes logarithmic.
     pub fn loglog(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
         Self::new(title, Axis::log(x), Axis::log(y))
@@ -216,22 +218,6 @@ impl Panel {
     pub fn with_all(mut self, layers: impl IntoIterator<Item = Layer>) -> Self {
         self.layers.extend(layers);
         self
-    }
-
-    /// Adds a solid line for each column of the rows, in colours by their order; columns without values are left out.
-    #[must_use]
-    pub fn with_lines<'r, R: 'r, Y: Into<Option<f64>>>(
-        self,
-        rows: impl IntoIterator<Item = &'r R>,
-        x: impl Fn(&R) -> f64,
-        columns: &[Curve<'_, R, Y>],
-    ) -> Self {
-        let rows: Vec<&R> = rows.into_iter().collect();
-        let line = |(colour, (label, y)): (usize, &Curve<'_, R, Y>)| {
-            Layer::line(*label, points(&rows, |r| (x(r), y(r)))).coloured(colour)
-        };
-        let lines = columns.iter().enumerate().map(line);
-        self.with_all(lines.filter(|line| !line.is_empty()))
     }
 
     /// Whether it is a map: its axes are the coordinates `x` and `y` in one unit. A metre is then as long on both.

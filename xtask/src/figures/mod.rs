@@ -2,6 +2,8 @@
 
 mod describe;
 mod gallery;
+#[cfg(test)]
+mod gate;
 mod options;
 mod produce;
 mod progress;
@@ -11,7 +13,6 @@ mod record;
 mod reuse;
 mod run;
 mod select;
-mod serve;
 #[cfg(test)]
 mod sources;
 mod summary;

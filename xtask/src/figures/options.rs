@@ -33,9 +33,6 @@ pub struct Options {
     /// Make all chosen figures anew, also those whose parameters and sources are unchanged since they were made.
     #[arg(long)]
     pub force: bool,
-    /// Show the gallery in a browser while the figures are made and until Ctrl-C.
-    #[arg(long)]
-    pub serve: bool,
     /// Write no SVG.
     #[arg(long)]
     pub no_plots: bool,

@@ -1,4 +1,4 @@
-//! One run: figures side by side, longest first; gallery and summary at its end, and all the time where they are served.
+//! One run: figures side by side, longest first; gallery and summary at its end.
 
 use super::produce::{Maker, STOP};
 use super::progress::{Progress, Running};
@@ -7,7 +7,7 @@ use super::record::Record;
 use super::select::Job;
 use super::times::expected_seconds;
 use super::write::{Directory, Made, Summary};
-use super::{Ending, Options, reuse, serve};
+use super::{Ending, Options, reuse};
 use crate::Error;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,9 +16,6 @@ use std::time::{Duration, Instant};
 
 /// How often the progress is asked whether it has something to say.
 const TICK: Duration = Duration::from_millis(500);
-
-/// Set when all figures are made, and the gallery alone is served.
-static MADE: AtomicBool = AtomicBool::new(false);
 
 /// A run while it goes on.
 struct Run<'a> {
@@ -55,9 +52,7 @@ fn stop_on_signals(note: &'static str) {
         if STOP.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        if !MADE.load(Ordering::Relaxed) {
-            eprint!("{note}");
-        }
+        eprint!("{note}");
     });
 }
 
@@ -107,9 +102,6 @@ pub(super) fn run(jobs: &[Job], out: &Directory, options: &Options, ranks: &Rank
         started: Instant::now(),
         finished: Mutex::new(finished),
     };
-    let server = options.serve.then(|| serve::Server::start(out.path())).transpose()?;
-    run.write_progress()?;
-
     let done = AtomicBool::new(false);
     std::thread::scope(|scope| {
         scope.spawn(|| {
@@ -122,12 +114,7 @@ pub(super) fn run(jobs: &[Job], out: &Directory, options: &Options, ranks: &Rank
         done.store(true, Ordering::Relaxed);
     });
     run.progress.clear();
-    let ending = run.close(jobs.len())?;
-    MADE.store(true, Ordering::Relaxed);
-    if let Some(server) = server {
-        server.wait(&STOP);
-    }
-    Ok(ending)
+    run.close(jobs.len())
 }
 
 impl Run<'_> {
@@ -156,9 +143,6 @@ impl Run<'_> {
         let mut finished = self.finished();
         finished.all.insert(record.id.clone(), record.clone());
         finished.records.insert(planned.place, record);
-        drop(finished);
-        // The end of the run says so if the page cannot be written.
-        let _ = self.write_progress();
     }
 
     /// Runs figures on all threads of all ranks. Figures of one world follow one another, from the place of the longest.
@@ -204,41 +188,22 @@ impl Run<'_> {
         });
     }
 
-    /// Writes gallery and summary as they stand, where somebody looks at them.
-    fn write_progress(&self) -> Result<(), Error> {
-        match self.options.serve {
-            true => self.write("In progress: this page shows what is finished."),
-            false => Ok(()),
-        }
-    }
-
-    /// Writes gallery and summary as they stand.
-    fn write(&self, note: &str) -> Result<(), Error> {
+    /// Writes the gallery and prints the summary.
+    fn close(&self, asked: usize) -> Result<Ending, Error> {
         let finished = self.finished();
-        let records: Vec<Record> = finished.records.values().cloned().collect();
-        self.summary(note)
-            .write(&records, &finished.all, self.started.elapsed())
-    }
-
-    fn summary<'a>(&'a self, note: &'a str) -> Summary<'a> {
-        Summary {
+        let (missing, elapsed) = (asked - finished.records.len(), self.started.elapsed());
+        let note = match missing {
+            0 => String::new(),
+            missing => format!("Stopped by the user: {missing} of {asked} figures were not made."),
+        };
+        let summary = Summary {
             out: self.out,
             json: self.options.json,
-            note,
-        }
-    }
-
-    /// Writes the gallery for the last time and prints the summary.
-    fn close(&self, asked: usize) -> Result<Ending, Error> {
-        let missing = asked - self.finished().records.len();
-        let note = if missing > 0 {
-            format!("Stopped by the user: {missing} of {asked} figures were not made.")
-        } else {
-            String::new()
+            note: &note,
         };
-        let written = self.write(&note);
-        let records: Vec<Record> = self.finished().records.values().cloned().collect();
-        let ending = self.summary(&note).print(&records, self.started.elapsed());
+        let records: Vec<Record> = finished.records.values().cloned().collect();
+        let written = summary.write(&records, &finished.all, elapsed);
+        let ending = summary.print(&records, elapsed);
         written?;
         Ok(if missing > 0 { Ending::Interrupted } else { ending })
     }

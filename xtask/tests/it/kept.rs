@@ -1,9 +1,7 @@
-//! What earlier runs left: kept, made anew, refused, shown.
+//! What earlier runs left: kept, made anew, refused.
 
 use super::{figures, files, text};
-use std::io::{BufRead, BufReader};
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::process::Command;
 
 #[test]
 fn a_figure_whose_files_were_emptied_is_made_anew() {
@@ -65,36 +63,4 @@ fn a_forged_record_reaches_no_file_outside_the_directory() {
         );
         let _ = std::fs::remove_file(shard.join("x.json"));
     }
-}
-
-#[test]
-#[cfg(unix)]
-fn one_interrupt_ends_the_served_gallery() {
-    let out = tempfile::tempdir().unwrap();
-    let mut run = Command::new(env!("CARGO_BIN_EXE_xtask"))
-        .args(["figures", "mi-table4-2", "--quick", "--serve", "--out"])
-        .arg(out.path())
-        // No browser is to open.
-        .env("PATH", "/nowhere")
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    let mut lines = BufReader::new(run.stdout.take().unwrap()).lines();
-    assert!(lines.any(|line| line.unwrap().contains("open ")), "no summary");
-    // The summary stands just before the wait.
-    std::thread::sleep(Duration::from_millis(200));
-    Command::new("kill")
-        .args(["-INT", &run.id().to_string()])
-        .status()
-        .unwrap();
-    let began = Instant::now();
-    let ended = loop {
-        match run.try_wait().unwrap() {
-            None if began.elapsed() < Duration::from_secs(20) => std::thread::sleep(Duration::from_millis(20)),
-            ended => break ended,
-        }
-    };
-    let _ = run.kill();
-    assert_eq!(ended.and_then(|status| status.code()), Some(0), "still served after one interrupt");
 }

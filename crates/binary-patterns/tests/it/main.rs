@@ -4,4 +4,5 @@
 mod bounds;
 mod entry;
 mod fixtures;
+mod patterns;
 mod wild;

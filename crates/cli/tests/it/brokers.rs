@@ -31,7 +31,7 @@ fn broker(folder: &Path, place: &str) -> Option<Running> {
 /// What is published on a topic, by a plain client of version 3.1.1 that is not the library's.
 fn published(place: &str, topic: &str) -> impl Iterator<Item = (String, Vec<u8>)> {
     let mut stream = std::net::TcpStream::connect(place).unwrap();
-    stream.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
     let connect = [&[0, 4][..], b"MQTT", &[4, 2, 0, 60, 0, 0]].concat();
     let subscribe = [&[0, 1, 0, topic.len() as u8][..], topic.as_bytes(), &[0]].concat();
     for (kind, body) in [(0x10, connect), (0x82, subscribe)] {
@@ -67,7 +67,7 @@ fn published(place: &str, topic: &str) -> impl Iterator<Item = (String, Vec<u8>)
 /// Publishes a message, by a plain client.
 fn publish(place: &str, topic: &str, content: &str) {
     let mut stream = std::net::TcpStream::connect(place).unwrap();
-    stream.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
     let connect = [&[0, 4][..], b"MQTT", &[4, 2, 0, 60, 0, 0]].concat();
     stream.write_all(&[0x10, connect.len() as u8]).unwrap();
     stream.write_all(&connect).unwrap();
@@ -124,7 +124,7 @@ fn uplinks_are_read_at_the_broker() {
     };
     let from = format!("mqtt://{place}/application/+/device/+/event/up");
     let mut receiver =
-        Running::new(start(folder.path(), &["receive", "--format", "lorawan", "--mqtt", &from, "--timeout", "20s"]));
+        Running::new(start(folder.path(), &["receive", "--format", "lorawan", "--mqtt", &from, "--timeout", "60s"]));
     let mut said = BufReader::new(receiver.stderr.take().unwrap()).lines();
     assert!(said.next().unwrap().unwrap().contains("listening at mqtt://"));
     let content = "{\"time\":\"2026-03-01T12:00:00Z\",\"deviceInfo\":{\"devEui\":\"0101010101010101\"},\"fPort\":2,\"data\":\"A2cBEAVnAP8=\"}";

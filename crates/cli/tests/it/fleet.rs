@@ -1,9 +1,12 @@
 //! A centre and its sensors as processes.
 
-use super::{Running, fewbits, start, text};
-use std::io::{BufRead, BufReader, Write};
+use super::{Running, fewbits, signal, start, text, wait_for};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::net::UdpSocket;
 use std::path::Path;
+use std::process::ExitStatus;
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
 
 /// Slot, reports, mean.
 pub(crate) type Row = (u64, u32, f64);
@@ -49,21 +52,57 @@ fn run(folder: &Path, slots: &str) -> Vec<Row> {
     rows(String::from_utf8(output.stdout).unwrap().lines())
 }
 
-/// The same until the rows so far are enough, however many slots that takes on a busy machine: half a minute at most.
+/// The slots after which a centre whose event does not come ends by itself: more than a minute.
+const MOST_SLOTS: &str = "1800";
+
+/// The same until the rows so far are enough, however many slots that takes on a busy machine.
 fn run_until(folder: &Path, is_enough: impl Fn(&[Row]) -> bool) -> Vec<Row> {
-    let mut centre = Running::new(start(folder, &["centre", "centre.toml", "--slots", "750"]));
+    let mut centre = Running::new(start(folder, &["centre", "centre.toml", "--slots", MOST_SLOTS]));
     let sensors = measuring(folder);
-    let mut lines = Vec::new();
-    for line in BufReader::new(centre.stdout.take().unwrap()).lines() {
-        lines.push(line.unwrap());
-        if is_enough(&rows(lines.iter().map(String::as_str))) {
-            break;
-        }
-    }
+    let lines = lines_until(&mut centre, |lines| is_enough(&rows(lines.iter().map(String::as_str))));
     centre.kill().unwrap();
     centre.wait().unwrap();
     ended(sensors);
     rows(lines.iter().map(String::as_str))
+}
+
+/// The lines of a process until they are enough; all if they never are.
+fn lines_until(process: &mut Running, is_enough: impl Fn(&[String]) -> bool) -> Vec<String> {
+    let mut lines = Vec::new();
+    for line in BufReader::new(process.stdout.take().unwrap()).lines() {
+        lines.push(line.unwrap());
+        if is_enough(&lines) {
+            break;
+        }
+    }
+    lines
+}
+
+/// Rows and words of a centre that is asked to end once they are enough, and how it ended.
+fn stopped_after(
+    mut centre: Running,
+    is_enough: impl Fn(&[String], &[String]) -> bool,
+) -> (Vec<String>, Vec<String>, ExitStatus) {
+    let (rows, said) = (Arc::default(), Arc::default());
+    let readers = [
+        follow(centre.stdout.take().unwrap(), &rows),
+        follow(centre.stderr.take().unwrap(), &said),
+    ];
+    wait_for("rows and words", || is_enough(&rows.lock().unwrap(), &said.lock().unwrap()));
+    signal(&centre, "-TERM");
+    let status = centre.wait().unwrap();
+    readers.into_iter().for_each(|reader| reader.join().unwrap());
+    let taken = |lines: &Mutex<Vec<String>>| std::mem::take(&mut *lines.lock().unwrap());
+    (taken(&rows), taken(&said), status)
+}
+
+/// Collects lines while a process writes them.
+fn follow(source: impl Read + Send + 'static, lines: &Arc<Mutex<Vec<String>>>) -> JoinHandle<()> {
+    let lines = lines.clone();
+    std::thread::spawn(move || {
+        let written = BufReader::new(source).lines().map_while(Result::ok);
+        written.for_each(|line| lines.lock().unwrap().push(line));
+    })
 }
 
 fn ended(sensors: [Running; 2]) {
@@ -81,7 +120,7 @@ pub(crate) fn measuring(folder: &Path) -> [Running; 2] {
 /// A sensor at work.
 pub(crate) fn sensor(folder: &Path, file: &str) -> Running {
     let mut child = Running::new(start(folder, &["sensor", file]));
-    let samples = "value\n".to_owned() + &"5.0\n5.2\n".repeat(800);
+    let samples = "value\n".to_owned() + &"5.0\n5.2\n".repeat(1600);
     child.stdin.take().unwrap().write_all(samples.as_bytes()).unwrap();
     child
 }
@@ -164,19 +203,22 @@ fn fleet_meets_over_zenoh() {
 fn sensor_with_another_key_is_not_heard() {
     let folder = tempfile::tempdir().unwrap();
     written(folder.path(), &free_place(), &key('c'));
-    let centre = start(folder.path(), &["centre", "centre.toml", "--slots", "50"]);
+    let centre = Running::new(start(folder.path(), &["centre", "centre.toml", "--slots", MOST_SLOTS]));
     let sensors = measuring(folder.path());
-    let output = centre.wait_with_output().unwrap();
+    let refused = |line: &String| {
+        line.split(',')
+            .nth(4)
+            .unwrap()
+            .parse::<u32>()
+            .is_ok_and(|count| count > 0)
+    };
+    let is_said = |line: &String| line.contains("sensor 2: ") && line.contains("under another key were refused");
+    let (lines, said, _) =
+        stopped_after(centre, |lines, said| lines.iter().skip(1).any(refused) && said.iter().any(is_said));
     ended(sensors);
     // It is said at the centre, by the sensor's own number, and in the rows.
-    let said = text(&output.stderr);
-    assert!(said.contains("sensor 2: ") && said.contains("under another key were refused"), "{said}");
-    let refused = text(&output.stdout);
-    let refused = refused
-        .lines()
-        .skip(1)
-        .map(|line| line.split(',').nth(4).unwrap().parse::<u32>().unwrap());
-    assert!(refused.sum::<u32>() > 0);
+    assert!(said.iter().any(is_said), "{said:?}");
+    assert!(lines.iter().skip(1).any(refused), "{lines:?}");
     let rows = run_until(folder.path(), |rows| rows.len() >= 50 && rows.iter().any(|(_, reports, _)| *reports == 1));
     assert!(rows.iter().any(|(_, reports, _)| *reports == 1) && rows.iter().all(|(_, reports, _)| *reports < 2));
 }
@@ -298,28 +340,27 @@ fn fleet_begins_with_one_command() {
             .stdin
             .take()
             .unwrap()
-            .write_all("5.0\n5.2\n".repeat(400).as_bytes())
+            .write_all("5.0\n5.2\n".repeat(1600).as_bytes())
             .unwrap();
         child
     });
-    let words = ["centre", "centre.toml", "--slots", "60", "--json"];
-    let output = fewbits(folder.path(), &words, b"");
+    let words = ["centre", "centre.toml", "--slots", MOST_SLOTS, "--json"];
+    let centre = Running::new(start(folder.path(), &words));
+    let parsed = |line: &String| serde_json::from_str::<serde_json::Value>(line).unwrap();
+    let both = |row: &serde_json::Value| row["reports"] == 2;
+    let (rows, said, status) = stopped_after(centre, |rows, said| {
+        let unknown = said.iter().any(|line| line.contains("unknown or revoked"));
+        unknown && rows.iter().map(parsed).any(|row| both(&row))
+    });
     for mut sensor in sensors {
         let _ = sensor.kill();
         sensor.wait().unwrap();
     }
-    let said = text(&output.stderr);
-    assert!(output.status.success(), "{said}");
-    let rows: Vec<serde_json::Value> = text(&output.stdout)
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect();
-    assert!(rows.iter().any(|row| row["reports"] == 2) && rows.iter().all(|row| row["sensors"][1]["number"] == 3));
-    let summary: serde_json::Value = serde_json::from_str(said.lines().last().unwrap()).unwrap();
-    assert!(
-        summary["envelopes"]["unknown"].as_u64().unwrap() > 0 && said.contains("unknown or revoked"),
-        "{said}"
-    );
+    assert!(status.success(), "{said:?}");
+    let rows: Vec<serde_json::Value> = rows.iter().map(parsed).collect();
+    assert!(rows.iter().any(both) && rows.iter().all(|row| row["sensors"][1]["number"] == 3));
+    let summary = parsed(said.last().unwrap());
+    assert!(summary["envelopes"]["unknown"].as_u64().unwrap() > 0, "{said:?}");
 }
 
 #[test]
@@ -327,10 +368,10 @@ fn second_centre_on_one_state_is_refused_and_nothing_else_is_silent() {
     let folder = tempfile::tempdir().unwrap();
     written(folder.path(), &free_place(), &key('b'));
     let mut first = Running::new(start(folder.path(), &["centre", "centre.toml"]));
-    while !folder.path().join("centre.state").exists() {
+    wait_for("a state", || {
         assert!(first.try_wait().unwrap().is_none());
-        std::thread::sleep(std::time::Duration::from_millis(20));
-    }
+        folder.path().join("centre.state").exists()
+    });
     let second = fewbits(folder.path(), &["centre", "centre.toml", "--slots", "1"], b"");
     assert!(text(&second.stderr).contains("in use by another process"), "{}", text(&second.stderr));
     first.kill().unwrap();
@@ -342,8 +383,9 @@ fn second_centre_on_one_state_is_refused_and_nothing_else_is_silent() {
     // A sensor whose centre does not run says so.
     let mut sensor = Running::new(start(folder.path(), &["sensor", "sensor1.toml"]));
     sensor.stdin.take().unwrap().write_all(&b"1\n".repeat(10)).unwrap();
-    std::thread::sleep(std::time::Duration::from_millis(10_500));
-    sensor.kill().unwrap();
-    let said = text(&sensor.output().stderr);
-    assert!(said.contains("no answer from 127.0.0.1:"), "{said}");
+    // It ends when it is dropped: until then it says so once a minute.
+    let mut said = BufReader::new(sensor.stderr.take().unwrap())
+        .lines()
+        .map(Result::unwrap);
+    assert!(said.any(|line| line.contains("no answer from 127.0.0.1:")));
 }

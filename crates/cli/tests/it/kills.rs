@@ -179,7 +179,7 @@ impl Centre {
     fn wait_for_both(&self, count: usize) {
         let began = Instant::now();
         while !self.rows().iter().skip(count).any(|((_, reports, _), _)| *reports == 2) {
-            assert!(began.elapsed() < Duration::from_secs(40), "no row has two reports");
+            assert!(began.elapsed() < Duration::from_secs(60), "no row has two reports");
             std::thread::sleep(Duration::from_millis(20));
         }
     }

@@ -1,9 +1,9 @@
 //! Live sources: what was read before an error or a signal is kept.
 
-use crate::{BOUND, fewbits, folder, good, start, table, text};
+use crate::{BOUND, fewbits, folder, good, start, table, text, wait_for};
 use std::io::Write;
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// The table with a line that is no row behind `rows` rows.
 fn garbled(rows: usize) -> Vec<u8> {
@@ -81,6 +81,28 @@ fn earlier_output_of_a_failed_pipe_stays_and_the_rows_are_beside() {
     assert!(output.status.code() == Some(2) && !folder.join("none.fewb").exists());
 }
 
+/// Whether a process handles SIGINT, and one of its threads is asleep in a read of its standard input: it has read all that was written.
+#[cfg(unix)]
+fn is_reading(id: u32) -> bool {
+    let of = |path: String| std::fs::read_to_string(path).unwrap_or_default();
+    let status = of(format!("/proc/{id}/status"));
+    let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+    let Some(caught) = caught.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()) else {
+        // Other systems do not say.
+        std::thread::sleep(Duration::from_secs(2));
+        return true;
+    };
+    let threads = std::fs::read_dir(format!("/proc/{id}/task")).unwrap();
+    // The number of the system call, which differs between machines, and its first argument, the descriptor.
+    let mut calls = threads.map(|thread| of(format!("{}/syscall", thread.unwrap().path().display())));
+    let read = if cfg!(target_arch = "x86_64") {
+        "0 0x0 "
+    } else {
+        "63 0x0 "
+    };
+    caught & 2 != 0 && calls.any(|call| call.starts_with(read))
+}
+
 /// Feeds 700 rows and keeps the pipe open; `end` then ends the command.
 #[cfg(unix)]
 fn interrupted(folder: &Path, words: &[&str], signal: &str) -> std::process::Output {
@@ -88,16 +110,9 @@ fn interrupted(folder: &Path, words: &[&str], signal: &str) -> std::process::Out
     let lines: Vec<String> = table().lines().take(701).map(|line| format!("{line}\n")).collect();
     let mut stdin = child.stdin.take().unwrap();
     stdin.write_all(lines.concat().as_bytes()).unwrap();
-    // The handler must be there: the command has read everything once the first frame or block is out, or after a while.
-    std::thread::sleep(Duration::from_millis(700));
-    let id = child.id().to_string();
-    assert!(
-        std::process::Command::new("kill")
-            .args([signal, &id])
-            .status()
-            .unwrap()
-            .success()
-    );
+    // The handler must be there, and the command wait for more.
+    wait_for("the command waits for a row", || is_reading(child.id()));
+    super::signal(&child, signal);
     let output = child.wait_with_output().unwrap();
     drop(stdin);
     output
@@ -129,23 +144,13 @@ fn signal_while_a_file_is_packed_leaves_nothing() {
     std::fs::write(folder.join("long.csv"), long).unwrap();
     std::fs::write(folder.join("old"), "earlier").unwrap();
     let child = start(&folder, &["pack", "long.csv", "-o", "old"]);
-    let begin = Instant::now();
     let beside = || {
         std::fs::read_dir(&folder)
             .unwrap()
             .any(|entry| entry.unwrap().file_name().to_string_lossy().contains("fewbits-new"))
     };
-    while !beside() && begin.elapsed() < Duration::from_secs(10) {
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let id = child.id().to_string();
-    assert!(
-        std::process::Command::new("kill")
-            .args(["-TERM", &id])
-            .status()
-            .unwrap()
-            .success()
-    );
+    wait_for("an unfinished file", beside);
+    super::signal(&child, "-TERM");
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{}", text(&output.stderr));
     assert!(!beside());
@@ -159,11 +164,7 @@ fn deadline_writes_rows_of_a_slow_pipe() {
     let mut stdin = child.stdin.take().unwrap();
     let head: String = table().lines().take(4).map(|line| format!("{line}\n")).collect();
     stdin.write_all(head.as_bytes()).unwrap();
-    let begin = Instant::now();
-    while rows(&folder, "slow.fewb") < 3 {
-        assert!(begin.elapsed() < Duration::from_secs(10), "no rows before the pipe ended");
-        std::thread::sleep(Duration::from_millis(50));
-    }
+    wait_for("rows before the pipe ends", || rows(&folder, "slow.fewb") >= 3);
     // A kill that cannot be caught leaves the rows so far.
     child.kill().unwrap();
     child.wait().unwrap();

@@ -81,6 +81,21 @@ impl Drop for Running {
     }
 }
 
+/// Asks a process to end.
+fn signal(child: &Child, name: &str) {
+    let status = Command::new("kill").args([name, &child.id().to_string()]).status();
+    assert!(status.unwrap().success());
+}
+
+/// Waits for an event, however slow the machine is; after a minute it is said not to have come.
+fn wait_for(what: &str, mut came: impl FnMut() -> bool) {
+    let began = std::time::Instant::now();
+    while !came() {
+        assert!(began.elapsed() < std::time::Duration::from_secs(60), "{what}: not within a minute");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+}
+
 /// The first `count` lines that a process writes, which is then ended; those there are if none comes for a minute. However slow the
 /// machine is, the same lines.
 fn first_lines(mut child: Child, count: usize) -> Vec<String> {

@@ -5,4 +5,5 @@
 mod centre;
 mod fixtures;
 mod laws;
+mod limits;
 mod wild;

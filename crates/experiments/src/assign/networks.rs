@@ -11,9 +11,9 @@ const SMALLEST: f64 = 1e-4;
 /// Draws before a network of positive variances is given up.
 const MAX_DRAWS: usize = 100_000;
 
-const DECODERS: [(&str, &str, Estimator); 2] = [
-    ("centre", "Cell's centre", Estimator::CellCentre),
-    ("posterior mean", "Posterior mean", Estimator::PosteriorMean),
+const DECODERS: [(&str, Estimator); 2] = [
+    ("centre", Estimator::CellCentre),
+    ("posterior mean", Estimator::PosteriorMean),
 ];
 
 parameters! {
@@ -43,14 +43,14 @@ rows! {
     /// Averages over networks, one row for each decoder.
     pub struct Row by "{at} {decoder}" {
         /// What is varied: standard deviation (`assign-fig6-3`) or mean (`assign-fig6-4`) of the noise variances.
-        at: f64 ["V^2"],
-        decoder: &'static str => "Decoder.",
+        at: f64 ["V^2"] as x("deviation or mean of the noise variances / V²"),
+        decoder: &'static str as panel("{}") => "Decoder.",
         trials: u64 => "Networks averaged.",
-        alg: Measured ["V^2"] => "Squared error of the linear assignment.",
-        min: Measured ["V^2"] => "Least over all assignments.",
-        ii: Measured ["V^2"] => "Most precise sensor to the coarsest bit.",
-        avg: Measured ["V^2"] => "Mean over all assignments.",
-        swap: Measured ["V^2"] => "Linear assignment improved by exchanges.",
+        alg: Measured ["V^2"] as curve("linear assignment") => "Squared error of the linear assignment.",
+        min: Measured ["V^2"] as curve("least of all") => "Least over all assignments.",
+        ii: Measured ["V^2"] as curve("assignment II") => "Most precise sensor to the coarsest bit.",
+        avg: Measured ["V^2"] as curve("mean of all") => "Mean over all assignments.",
+        swap: Measured ["V^2"] as curve("with exchanges") => "Linear assignment improved by exchanges.",
         excess: Measured => "Mean of alg/min - 1.",
     }
 }
@@ -74,7 +74,7 @@ fn evaluate(variances: &[f64]) -> Result<Vec<f64>, Error> {
     let linear = pair_costs(&sensors).solve();
     let second = by_precision(variances);
     let mut errors = Vec::new();
-    for (.., decoder) in DECODERS {
+    for (_, decoder) in DECODERS {
         let all = all_errors(&sensors, decoder)?;
         let own = sensors.mse(&linear, decoder)?;
         // The enumeration and single evaluations round differently.
@@ -88,7 +88,6 @@ fn evaluate(variances: &[f64]) -> Result<Vec<f64>, Error> {
 /// A figure over one of the moments.
 pub struct Networks {
     about: About,
-    label: &'static str,
     points: fn() -> Vec<Moment>,
     varied: fn(&Moment) -> f64,
     /// What is claimed besides the orders that hold everywhere.
@@ -100,7 +99,6 @@ pub static SPREAD: Networks = Networks {
         .showing("Random networks of four sensors with mean noise variance 0.03. The more the sensors differ, the more a good assignment \
         gains; an arbitrary one gains nearly nothing. For the posterior mean the linear assignment is not quite right, and a few \
         exchanges of two sensors mend it."),
-    label: "standard deviation of the noise variances / V²",
     points: || [0.0, 0.005, 0.01, 0.015, 0.02, 0.025, 0.03].map(|sd| Moment { mean: 0.03, sd }).into(),
     varied: |moment| moment.sd,
     claims: |rows, claims| {
@@ -127,7 +125,6 @@ pub static MEAN: Networks = Networks {
         .showing("Random networks of four sensors whose noise variances have standard deviation 0.015. As the noise grows the cost \
         approximation, which counts single wrong bits only, loses its edge: at a mean of 0.1 giving the best sensor the \
         coarsest bit is slightly better."),
-    label: "mean of the noise variances / V²",
     points: || {
         let means = [0.015, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1];
         means.map(|mean| Moment { mean, sd: 0.015 }).into()
@@ -153,7 +150,7 @@ fn centre(rows: &[Row]) -> impl Iterator<Item = &Row> {
 }
 
 impl Figure for Networks {
-    figure!(Parameters => Vec<Row>, about);
+    figure!(Parameters => Vec<Row>, about; linear("mean squared error / V²"));
 
     fn defaults(&self) -> Parameters {
         Parameters {
@@ -178,7 +175,7 @@ impl Figure for Networks {
                 evaluate(&variances)
             };
             let sums = context.moments(stream, trials, one)?;
-            for ((decoder, ..), sums) in DECODERS.into_iter().zip(sums.chunks(6)) {
+            for ((decoder, _), sums) in DECODERS.into_iter().zip(sums.chunks(6)) {
                 rows.push(Row {
                     at: (self.varied)(moment),
                     decoder,
@@ -201,21 +198,5 @@ impl Figure for Networks {
         let what = "for the centre decoder the linear assignment is on average within 2.5 % of the minimum";
         claims.all("excess-center", what, centre(rows), |r| r.excess.value <= 0.025);
         (self.claims)(rows, claims);
-    }
-
-    fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
-        let panel = |(decoder, title, _): (&'static str, &str, _)| {
-            let curve = |text: &str, colour, value: fn(&Row) -> Measured| {
-                let own = select(rows, |r| r.decoder == decoder).map(|r| (r.at, value(r)));
-                Layer::curve(text, colour, own.collect())
-            };
-            Panel::linear(title, self.label, "mean squared error / V²")
-                .with_all(curve("mean of all", 0, |r| r.avg))
-                .with_all(curve("assignment II", 1, |r| r.ii))
-                .with_all(curve("linear assignment", 2, |r| r.alg))
-                .with_all(curve("with exchanges", 3, |r| r.swap))
-                .with_all(curve("least of all", 6, |r| r.min))
-        };
-        Plot::grid(2, DECODERS.map(panel).to_vec())
     }
 }

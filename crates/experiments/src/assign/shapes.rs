@@ -95,8 +95,8 @@ parameters! {
 
 rows! {
     pub struct Wrong {
-        x: f64 ["V"] => "Source.",
-        pa: [f64; BITS] => "Probability that the bit of this number is wrong, the coarsest being 1.",
+        x: f64 ["V"] as x("source x / V") => "Source.",
+        pa: [f64; BITS] as line("bit {}") => "Probability that the bit of this number is wrong, the coarsest being 1.",
     }
 }
 
@@ -104,7 +104,7 @@ impl Figure for BitErrors {
     figure!(ErrorParameters => Vec<Wrong>, "assign-figC-1", "Probability that a bit is wrong", "Movaghati, thesis, figure C.1",
         "For each bit of a four-bit Gray code, the probability that noise turns it: one half at the bit's own edges, \
          except where noise reaches across further ones, and for the finest bit hardly less between them. The thesis \
-         calls the variance sigma.");
+         calls the variance sigma."; linear("probability that the bit is wrong"));
 
     fn run(&self, p: &ErrorParameters, _: &Context<'_>) -> Result<Vec<Wrong>, Error> {
         let sensors = CodedSensors::with_variances(1.0, &[p.variance; BITS])?;
@@ -128,13 +128,5 @@ impl Figure for BitErrors {
         claims.all("probabilities", what, rows, |r| r.pa.iter().all(|p| (0.0..=1.0).contains(p)));
         let mean = |bit: usize| rows.iter().map(|r| r.pa[bit]).sum::<f64>() / rows.len() as f64;
         here.increasing("order", "finer bits are wrong more often on average", (0..BITS).map(mean));
-    }
-
-    fn plot(&self, p: &ErrorParameters, rows: &Vec<Wrong>) -> Plot {
-        let line =
-            |bit: usize| Layer::line(format!("bit {}", bit + 1), points(rows, |r| (r.x, r.pa[bit]))).coloured(bit);
-        let y = Axis::linear("probability that the bit is wrong").between(0.0, 0.9);
-        let title = format!("Noise variance {} V²", p.variance);
-        Plot::of(Panel::new(title, Axis::linear("source x / V"), y).with_all((0..BITS).map(line)))
     }
 }

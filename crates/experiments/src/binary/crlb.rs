@@ -1,6 +1,6 @@
 //! `binary-fig5-6`: equation 5.13 for three sets of patterns, and why it misleads.
 
-use super::{ERROR, SNR, Scene, crossing, each, sweep, swept};
+use super::{ERROR, Scene, crossing, each, sweep, swept};
 use crate::prelude::*;
 use fewbits_baselines::binary_patterns::printed_crlb;
 use fewbits_binary_patterns::{Mask, gray_basis, natural_basis};
@@ -31,14 +31,14 @@ rows! {
     }
 
     struct Row {
-        bits: usize => "Bits B and sensors N.",
-        snr_db: f64 ["dB"] => "Signal-to-noise ratio.",
-        crlb_fixed: f64 ["V^2"] => "Equation 5.13, all thresholds at zero.",
-        crlb_natural: f64 ["V^2"] => "Equation 5.13, natural patterns.",
-        crlb_gray: f64 ["V^2"] => "Equation 5.13, Gray patterns.",
-        mse_fixed: f64 ["V^2"] => "Exact error, all thresholds at zero.",
-        mse_natural: f64 ["V^2"] => "Exact error, natural patterns.",
-        mse_gray: f64 ["V^2"] => "Exact error, Gray patterns.",
+        bits: usize as panel("{} bits") => "Bits B and sensors N.",
+        snr_db: f64 ["dB"] as x("signal-to-noise ratio / dB") => "Signal-to-noise ratio.",
+        crlb_fixed: f64 ["V^2"] as line("fixed threshold") in values => "Equation 5.13, all thresholds at zero.",
+        crlb_natural: f64 ["V^2"] as line("natural patterns") in values => "Equation 5.13, natural patterns.",
+        crlb_gray: f64 ["V^2"] as line("Gray patterns") in values => "Equation 5.13, Gray patterns.",
+        mse_fixed: f64 ["V^2"] as line("fixed threshold") in errors => "Exact error, all thresholds at zero.",
+        mse_natural: f64 ["V^2"] as line("natural patterns") in errors => "Exact error, natural patterns.",
+        mse_gray: f64 ["V^2"] as line("Gray patterns") in errors => "Exact error, Gray patterns.",
     }
 
     struct Crossing {
@@ -52,7 +52,8 @@ impl Figure for PrintedBounds {
     figure!(Parameters => Rows, "binary-fig5-6", "The printed Cramer-Rao formula for fixed, natural and Gray patterns", "Movaghati, thesis, figure 5.6",
         "Left: equation 5.13 prefers a fixed threshold at low, Gray patterns at medium and natural patterns at high \
          signal-to-noise ratio. Right: the exact errors of the same sets. At high ratios Gray patterns are better throughout: the \
-         formula averages information and does not see that natural bits fail together.");
+         formula averages information and does not see that natural bits fail together.";
+        { values: semilog("value / V²", "Equation 5.13"), errors: semilog(ERROR, "Exact error") });
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let mut rows = Rows::default();
@@ -97,27 +98,5 @@ impl Figure for PrintedBounds {
         let beyond = select(&rows.sets, |r| natural(r.bits).is_some_and(|at| r.snr_db > at));
         let what = "where the formula prefers natural patterns, Gray patterns have the smaller error";
         claims.all("contradiction", what, beyond, |r| r.crlb_natural < r.crlb_gray && r.mse_gray < r.mse_natural);
-    }
-
-    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
-        let panels = p.bits.iter().flat_map(|&bits| {
-            let own = || select(&rows.sets, move |r| r.bits == bits);
-            let title = |what: &str| format!("{what}, {bits} sensors of {bits} bits");
-            let values: [Curve<'_, Row, f64>; 3] = [
-                ("fixed threshold", |r| r.crlb_fixed),
-                ("natural patterns", |r| r.crlb_natural),
-                ("Gray patterns", |r| r.crlb_gray),
-            ];
-            let errors: [Curve<'_, Row, f64>; 3] = [
-                (values[0].0, |r| r.mse_fixed),
-                (values[1].0, |r| r.mse_natural),
-                (values[2].0, |r| r.mse_gray),
-            ];
-            [
-                Panel::semilog(title("Equation 5.13"), SNR, "value / V²").with_lines(own(), |r| r.snr_db, &values),
-                Panel::semilog(title("Exact error"), SNR, ERROR).with_lines(own(), |r| r.snr_db, &errors),
-            ]
-        });
-        Plot::grid(2, panels.collect())
     }
 }

@@ -1,6 +1,6 @@
 //! `binary-fig5-10`: ten sensors, with and without feedback.
 
-use super::{ERROR, SNR, Scene, descent_from, each, sweep, swept};
+use super::{ERROR, Scene, descent_from, each, sweep, swept};
 use crate::prelude::*;
 use fewbits_baselines::binary_patterns::{AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound};
 use fewbits_binary_patterns::bounds::ConditionalMean;
@@ -29,20 +29,21 @@ fn descend(bits: usize, sensors: usize, snr: f64) -> Result<(Vec<Mask>, f64), Er
 
 rows! {
     pub struct Row by "{snr_db} dB" {
-        snr_db: f64 ["dB"] => "Signal-to-noise ratio.",
-        lbqp_b3: f64 ["V^2"] => "Best linear patterns of three bits, exhaustive.",
-        masks_b3: String => "Their masks.",
-        lbqp_best: f64 ["V^2"] => "Best linear patterns of any number of bits, by descent beyond three.",
-        bits: usize => "That number of bits.",
-        masks: String => "Their masks.",
-        fixed: f64 ["V^2"] => "All thresholds at zero, posterior mean.",
-        luo_soft: Option<f64> ["V^2"] => "Luo's allocation, linear fusion.",
-        ribeiro_relaxed: f64 ["V^2"] => "Relaxed multi-threshold bound.",
-        aqvs_mle: f64 ["V^2"] => "Adaptive variable step, bounded maximum likelihood.",
-        aqml_mle: f64 ["V^2"] => "Adaptive maximum likelihood, bounded maximum likelihood.",
+        snr_db: f64 ["dB"] as x("signal-to-noise ratio / dB") => "Signal-to-noise ratio.",
+        lbqp_b3: f64 ["V^2"] as line("patterns, three bits") in errors => "Best linear patterns of three bits, exhaustive.",
+        masks_b3: List<Mask> => "Their masks.",
+        /// Best linear patterns of any number of bits, by descent beyond three.
+        lbqp_best: f64 ["V^2"] as line("best patterns") in errors,
+        bits: usize as points("best") in bits => "That number of bits.",
+        masks: List<Mask> => "Their masks.",
+        fixed: f64 ["V^2"] as line("fixed threshold") in errors => "All thresholds at zero, posterior mean.",
+        luo_soft: Option<f64> ["V^2"] as line("Luo, linear") in errors => "Luo's allocation, linear fusion.",
+        ribeiro_relaxed: f64 ["V^2"] as dashed("multi-threshold bound") in errors => "Relaxed multi-threshold bound.",
+        aqvs_mle: f64 ["V^2"] as line("AQ-VS") in errors => "Adaptive variable step, bounded maximum likelihood.",
+        aqml_mle: f64 ["V^2"] as line("AQ-ML") in errors => "Adaptive maximum likelihood, bounded maximum likelihood.",
         aqml_mmse: f64 ["V^2"] => "Adaptive maximum likelihood, posterior mean.",
-        aq_posterior_mean: f64 ["V^2"] => "Adaptive posterior mean.",
-        clairvoyant: f64 ["V^2"] => "All measurements without quantization.",
+        aq_posterior_mean: f64 ["V^2"] as dashed("AQ, posterior mean") in errors => "Adaptive posterior mean.",
+        clairvoyant: f64 ["V^2"] as dashed("unquantized") in errors => "All measurements without quantization.",
     }
 }
 
@@ -69,10 +70,10 @@ fn row(p: &Parameters, snr_db: f64) -> Result<Row, Error> {
     Ok(Row {
         snr_db,
         lbqp_b3: coarse.mse,
-        masks_b3: joined(&coarse.masks, " "),
+        masks_b3: List(coarse.masks),
         lbqp_best: best.2,
         bits: best.0,
-        masks: joined(&best.1, " "),
+        masks: List(best.1),
         fixed: fixed_threshold(scene.source, scene.noise, p.sensors)?.mmse()?,
         luo_soft: luo.ok().map(|errors| errors.soft),
         ribeiro_relaxed: multi_threshold_bound(&scene.source, scene.noise, p.sensors)?.bound,
@@ -89,7 +90,8 @@ impl Figure for Feedback {
     figure!(Parameters => Vec<Row>, "binary-fig5-10", "Ten sensors against schemes with thresholds and with feedback", "Movaghati, thesis, figure 5.10",
         "Linear patterns of the best resolution beat the relaxed multi-threshold bound from 5 dB on, and the adaptive variable-step \
          scheme (AQ-VS) from 20 dB on. The adaptive maximum-likelihood scheme (AQ-ML), which needs feedback, is better \
-         than they are at every ratio from 5 to 40 dB: the thesis's claim is not reproduced.");
+         than they are at every ratio from 5 to 40 dB: the thesis's claim is not reproduced.";
+        { errors: semilog(ERROR, "Errors"), bits: linear("bits of the cell index", "Best resolution") });
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Vec<Row>, Error> {
         // The costly points first, so that no thread is left alone with one at the end.
@@ -115,25 +117,5 @@ impl Figure for Feedback {
         claims.all("decoder", what, rows, |r| r.aqml_mmse <= r.aqml_mle);
         let what = "nothing is below the unquantized estimate";
         claims.all("floor", what, rows, |r| r.clairvoyant <= r.lbqp_best.min(r.aq_posterior_mean));
-    }
-
-    fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
-        let points = |of: fn(&Row) -> Option<f64>| points(rows, |r| (r.snr_db, of(r)));
-        let errors = Panel::semilog(format!("{} sensors", p.sensors), SNR, ERROR)
-            .with(Layer::line("patterns, best resolution", points(|r| Some(r.lbqp_best))).coloured(0))
-            .with(Layer::line("patterns, three bits", points(|r| Some(r.lbqp_b3))).coloured(5))
-            .with(Layer::line("fixed threshold", points(|r| Some(r.fixed))).coloured(4))
-            .with(Layer::line("Luo, linear", points(|r| r.luo_soft)).coloured(3))
-            .with(Layer::dashed("multi-threshold bound", points(|r| Some(r.ribeiro_relaxed))).coloured(6))
-            .with(Layer::line("AQ-VS", points(|r| Some(r.aqvs_mle))).coloured(2))
-            .with(Layer::line("AQ-ML", points(|r| Some(r.aqml_mle))).coloured(1))
-            .with(Layer::dashed("AQ, posterior mean", points(|r| Some(r.aq_posterior_mean))).coloured(1))
-            .with(Layer::dashed("unquantized", points(|r| Some(r.clairvoyant))).coloured(7));
-        let bits = Axis::linear("bits of the cell index").between(2.5, p.most_bits as f64 + 0.5);
-        let bits = bits.named((3..=p.most_bits).map(|b| (b as f64, b.to_string())));
-        let resolution = Panel::new("Best resolution", Axis::linear(SNR), bits)
-            .with(Layer::points("", points(|r| Some(r.bits as f64))).coloured(0))
-            .without_legend();
-        Plot::grid(2, vec![errors, resolution])
     }
 }

@@ -15,8 +15,7 @@ use crate::prelude::*;
 use fewbits_binary_patterns::search::{Descent, LinearSearch};
 use fewbits_binary_patterns::{Bank, CellGrid, Mask, Pattern, Source, linear_pattern, rank};
 
-/// Axes of the curves.
-const SNR: &str = "signal-to-noise ratio / dB";
+/// Axis of the curves.
 const ERROR: &str = "mean squared error / V²";
 
 /// Variance of the thesis's Gaussian source.

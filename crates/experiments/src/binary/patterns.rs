@@ -2,9 +2,7 @@
 
 use super::{Scene, pattern, pattern_panel};
 use crate::prelude::*;
-use fewbits_binary_patterns::{
-    BinaryQuantizer, CellGrid, Mask, Pattern, check_separation, generator_matrix, gray_basis, natural_basis,
-};
+use fewbits_binary_patterns::{BinaryQuantizer, CellGrid, Mask, Pattern, gray_basis, natural_basis};
 
 pub struct Clipping;
 
@@ -29,21 +27,22 @@ rows! {
     }
 
     struct Cell {
-        y: f64 ["V"] => "Measurement.",
-        cell: usize => "Cell of the measurement, from 1.",
-        cell_swapped: usize => "The same with the printed sides of the clipping rule.",
+        y: f64 ["V"] as x("measurement y / V") => "Measurement.",
+        cell: usize as line("nearest outer cell") => "Cell of the measurement, from 1.",
+        cell_swapped: usize as dashed("sides as printed") => "The same with the printed sides of the clipping rule.",
     }
 
     struct Rule by "{rule}" {
         rule: &'static str => "Clipping rule.",
-        mse: f64 ["V^2"] => "Exact error of the posterior mean.",
+        /// Exact error of the posterior mean: with the printed sides even the best masks are thirteen times worse (erratum binary-1).
+        mse: f64 ["V^2"],
     }
 }
 
 impl Figure for Clipping {
     figure!(ClippingParameters => Clipped, "binary-fig5-2", "Cells of the measurement axis and the clipping rule", "Movaghati, thesis, section 5.2",
         "The axis is cut into 2^B cells; measurements beyond [-V, V] fall into the nearest outer cell. The thesis prints \
-         the two sides of this rule swapped (dashed); taken literally that ruins the best eight patterns.");
+         the two sides of this rule swapped (dashed); taken literally that ruins the best eight patterns."; linear("cell"));
 
     fn run(&self, p: &ClippingParameters, _: &Context<'_>) -> Result<Clipped, Error> {
         let grid = CellGrid::uniform(1.0, p.bits)?;
@@ -91,17 +90,6 @@ impl Figure for Clipping {
     fn claims(&self, _: &ClippingParameters, tables: &Clipped, claims: &mut Claims) {
         let what = "the cell never decreases with the measurement";
         claims.all("monotone", what, tables.cells.windows(2), |w| w[1].cell >= w[0].cell);
-        let what = "the best eight patterns at 18.2 dB; with the printed sides even the best masks are thirteen times worse (erratum \
-                    binary-1)";
-        claims.keyed("mse", what, &tables.errors, |r| r.mse);
-    }
-
-    fn plot(&self, _: &ClippingParameters, tables: &Clipped) -> Plot {
-        let curve = |cell: fn(&Cell) -> usize| points(&tables.cells, |c| (c.y, cell(c) as f64));
-        let panel = Panel::linear("Cell of a measurement", "measurement y / V", "cell")
-            .with(Layer::dashed("sides as printed", curve(|c| c.cell_swapped)).coloured(1))
-            .with(Layer::line("nearest outer cell", curve(|c| c.cell)).coloured(0));
-        Plot::of(panel)
     }
 }
 
@@ -126,8 +114,6 @@ pub struct Patterns {
     /// Masks beyond the Gray basis; without them the figure has no such parameter.
     extra: Option<&'static [Mask]>,
     masks: fn(&PatternParameters) -> Result<Vec<Named>, Error>,
-    /// What is claimed besides.
-    claims: fn(&PatternParameters, &Claims),
 }
 
 parameters! {
@@ -164,7 +150,6 @@ pub static NATURAL: Patterns = Patterns {
     ],
     extra: None,
     masks: |p| Ok(numbered("N", natural_basis(p.bits)?)),
-    claims: |_, _| {},
 };
 
 pub static GRAY: Patterns = Patterns {
@@ -181,13 +166,6 @@ pub static GRAY: Patterns = Patterns {
     ],
     extra: None,
     masks: |p| Ok(numbered("G", gray_basis(p.bits)?)),
-    claims: |p, claims| {
-        let matrix = gray_basis(p.bits).and_then(|basis| generator_matrix(&basis, p.bits));
-        let matrix = matrix.unwrap_or_default();
-        claims.all("adjacent", "neighbouring cells differ in exactly one bit", matrix.windows(2), |w| {
-            w[0].iter().zip(&w[1]).filter(|(a, b)| a != b).count() == 1
-        });
-    },
 };
 
 pub static EXTRA: Patterns = Patterns {
@@ -199,17 +177,6 @@ pub static EXTRA: Patterns = Patterns {
     printed: &["0011110011000011", "0101101001011010", "0110011010011001"],
     extra: Some(&[14, 5, 11]),
     masks: |p| Ok(p.extra().iter().map(|&mask| (format!("mask {mask}"), mask)).collect()),
-    claims: |p, claims| {
-        let masks = gray_basis(p.bits).unwrap_or_default().into_iter().chain(p.extra().iter().copied());
-        let all: Option<Vec<Pattern>> = masks.map(|mask| pattern(mask, p.bits).ok()).collect();
-        let what = "with the Gray basis they separate all cells";
-        claims.all("separating", what, all, |patterns| check_separation(&patterns).is_ok());
-        // Independent over GF(2), yet two cells carry the same column: footnote 2 of the thesis holds for linear patterns only.
-        let texts = ["00001111", "00110000", "01000000"];
-        let counterexample: Option<Vec<Pattern>> = texts.iter().map(|text| text.parse().ok()).collect();
-        let what = "independent patterns that are not linear need not separate the cells (erratum binary-3)";
-        claims.all("independence", what, counterexample, |patterns| check_separation(&patterns).is_err());
-    },
 };
 
 impl Figure for Patterns {
@@ -237,14 +204,13 @@ impl Figure for Patterns {
         Ok(table)
     }
 
-    fn claims(&self, p: &PatternParameters, table: &Vec<Bit>, claims: &mut Claims) {
+    fn claims(&self, _: &PatternParameters, table: &Vec<Bit>, claims: &mut Claims) {
         let printed = self.printed.concat();
         let same = |(row, digit): (&Bit, char)| char::from_digit(row.bit, 2) == Some(digit);
         let rows = if table.len() == printed.len() { &table[..] } else { &[] };
         claims
             .at_defaults()
             .all("bits", self.what, rows.iter().zip(printed.chars()), same);
-        (self.claims)(p, claims);
     }
 
     fn plot(&self, _: &PatternParameters, table: &Vec<Bit>) -> Plot {
@@ -268,17 +234,18 @@ parameters! {
 
 rows! {
     pub struct Answer {
-        x: f64 ["V"] => "Source.",
-        bit: u32 => "Bit without noise.",
-        p1: f64 => "Probability of a 1.",
-        information: f64 ["1/V^2"] => "Fisher information about x in the bit.",
+        x: f64 ["V"] as x("source x / V") => "Source.",
+        bit: u32 as dashed("without noise") in probability => "Bit without noise.",
+        p1: f64 as line("with noise") in probability => "Probability of a 1.",
+        information: f64 ["1/V^2"] as line("of the bit") in information => "Fisher information about x in the bit.",
     }
 }
 
 impl Figure for Response {
     figure!(ResponseParameters => Vec<Answer>, "binary-figB-1", "Probability of a 1 under a pattern with four edges", "Movaghati, thesis, figure B.1",
         "Noise rounds the pattern off; a run of cells narrower than about two standard deviations never reaches certainty. The \
-         derivative of this curve over its standard deviation is the information in the bit.");
+         derivative of this curve over its standard deviation is the information in the bit.";
+        { probability: linear("P(1 | x)", "Probability of a 1"), information: linear("Fisher information / V⁻²", "Information in the bit") });
 
     fn run(&self, p: &ResponseParameters, _: &Context<'_>) -> Result<Vec<Answer>, Error> {
         let quantizer = BinaryQuantizer::new(p.thresholds.clone())?;
@@ -302,15 +269,5 @@ impl Figure for Response {
             nearest.is_some_and(|r| (r.p1 - 0.5).abs() <= 2e-3)
         });
         claims.all("probabilities", "all values are probabilities", rows, |r| (0.0..=1.0).contains(&r.p1));
-    }
-
-    fn plot(&self, _: &ResponseParameters, rows: &Vec<Answer>) -> Plot {
-        let probability = Panel::linear("Probability of a 1", "source x / V", "P(1 | x)")
-            .with(Layer::dashed("without noise", points(rows, |r| (r.x, f64::from(r.bit)))).coloured(7))
-            .with(Layer::line("with noise", points(rows, |r| (r.x, r.p1))).coloured(0));
-        let information = Panel::linear("Information in the bit", "source x / V", "Fisher information / V⁻²")
-            .with(Layer::line("", points(rows, |r| (r.x, r.information))).coloured(1))
-            .without_legend();
-        Plot::grid(2, vec![probability, information])
     }
 }

@@ -136,8 +136,6 @@ impl Figure for Table {
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
         let at = |set: &str| rows.sets.iter().find(|r| r.set == set);
-        let what = "exact error, of a variance of 0.1; without the rank constraint a quarter less than Gray";
-        claims.keyed("mmse", what, &rows.sets, |r| r.mse_mmse);
         let linear = at("printed").map(|r| r.linear as f64);
         here.near("not-linear", "one of the printed patterns is not linear (erratum binary-12)", linear, 2.0, 0.0);
         let rank = at("printed").and_then(|r| Some(r.rank? as f64));

@@ -12,8 +12,6 @@ pub(crate) struct Simulated<S, M, X = ()> {
     pub(super) caption: &'static str,
     /// Schemes that are compared trial by trial, wherever both ran.
     pub(super) pairs: &'static [(&'static str, &'static str)],
-    /// Quantities with independent references.
-    pub(super) references: &'static [&'static str],
     /// The publication's setting.
     pub(super) setting: fn() -> S,
     /// All runs.
@@ -33,7 +31,6 @@ impl<S: Setting, M: Main, X: Default> Simulated<S, M, X> {
         about: About::of("", "", ""),
         caption: "",
         pairs: &[],
-        references: &["position", "velocity", "rate"],
         setting: S::default,
         simulate: |_, _| Ok(Vec::new()),
         further: |_| Ok(X::default()),
@@ -78,9 +75,7 @@ impl<S: Setting, M: Main, X: Default + Field> Figure for Simulated<S, M, X> {
     }
 
     fn claims(&self, _: &S, rows: &Rows<M, X>, claims: &mut Claims) {
-        let mut limited = claims.at_defaults().at_full_trials();
-        rows.agree(&mut limited, self.references);
-        (self.claims)(rows, &mut limited);
+        (self.claims)(rows, &mut claims.at_defaults().at_full_trials());
     }
 
     fn plot(&self, setting: &S, rows: &Rows<M, X>) -> Plot {

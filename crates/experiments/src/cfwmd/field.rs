@@ -192,7 +192,6 @@ pub(crate) static TABLE3: Simulated<Field, Rates> = Simulated {
               the prior mean fits best, and leaves the rates at l = 2 about 0.1 below the printed ones, unexplained. \
               2500 particles, where the publication has 10000; drawn starts run 1000.",
     pairs: &[("CFwMD2", "CFwMD")],
-    references: &["rate"],
     setting: || Field {
         drawn_start: None,
         particles: 2500,

@@ -77,15 +77,15 @@ impl Run {
         format!("{}{}", self.scheme, in_world(&self.world))
     }
 
-    /// The key of its references.
-    fn key(&self) -> String {
-        format!("{}, l = {}", self.name(), self.l)
-    }
-
     /// The run of another scheme in the same place.
     pub(super) fn of<'a>(&self, scheme: &str, all: &'a [Ensemble]) -> Option<&'a Ensemble> {
         first(all, |e| (e.run.scheme, &e.run.world, e.run.l) == (scheme, &self.world, self.l))
     }
+}
+
+/// The key of the references of a run.
+fn key(summary: &Summary) -> String {
+    format!("{}, l = {}", summary.run.name(), summary.run.l)
 }
 
 /// A world behind a comma, if it has a name.
@@ -107,7 +107,7 @@ rows! {
     }
 
     /// One run, averaged over its steps.
-    pub struct Summary {
+    pub struct Summary by key at full_trials {
         pub(super) run: Run,
         pub(super) position_rmse: Measured ["m"] => "Root mean squared position error over trials and steps.",
         pub(super) velocity_rmse: Measured ["m/s"] => "Root mean squared velocity error over trials and steps.",
@@ -230,21 +230,6 @@ impl<M, X> Rows<M, X> {
             let id = format!("{first}-beats-{second}-{what}-l{l}{place}").replace([' ', ','], "-");
             let what = format!("{first} has the smaller {what} error than {second} at l = {l}{place}");
             claims.less(id, what, difference, 3.0);
-        }
-    }
-
-    /// Claims that the runs agree with independent ones: the references of these quantities.
-    pub(super) fn agree(&self, claims: &mut Claims, quantities: &[&str]) {
-        for quantity in quantities {
-            let what = format!("{quantity} as in the independent runs");
-            claims.references(quantity, &what, &self.summary, |r| {
-                let value = match *quantity {
-                    "position" => r.position_rmse,
-                    "velocity" => r.velocity_rmse,
-                    _ => r.rate,
-                };
-                (r.run.key(), value)
-            });
         }
     }
 }

@@ -72,7 +72,6 @@ pub(crate) static FIG5: Simulated<Linear, Step> = Simulated {
     caption: "With vector measurements covariance feedback (CFwMD2) is better at each budget; at the acceleration \
               variance that the text states it would not be, at one message a step.",
     pairs: &[("CFwMD2", "CFwMD")],
-    references: &["position", "velocity"],
     setting: || Linear::vector(4, &[1.0, 2.0, 3.0]),
     simulate: |setting, context| both(context, setting, &CENSORED, &CENSORED),
     shown: |p, run| run.world == world(p.acceleration_variance),
@@ -137,7 +136,6 @@ pub(crate) static TABLE2: Simulated<Linear, Rates> = Simulated {
     caption: "The published rates fit an acceleration variance of 1, not the stated 4; next best is 4 with the printed \
               noise [2 4] read as standard deviations.",
     pairs: &[("CFwMD2", "CFwMD")],
-    references: &["rate"],
     setting: || Linear::vector(4, &[1.0, 2.0, 3.0]),
     simulate: |setting, context| {
         let mut all = both(context, setting, &CENSORED, &CENSORED)?;

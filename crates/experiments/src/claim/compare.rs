@@ -76,47 +76,50 @@ impl Claims {
                 .collect()
         };
         for quantity in open {
-            let column = |table: &Table| {
-                table
-                    .columns
-                    .iter()
-                    .position(|column| column.name == quantity.replace('-', "_"))
-            };
-            // Of several tables with the column, that whose rows the references name.
+            let name = quantity.replace('-', "_");
+            let column = |table: &Table| table.columns.iter().position(|column| column.name == name);
+            // Of several tables with the column, those first whose rows the references name.
             let known = reference::group(self.figure, quantity).unwrap_or_default();
             let is_named = |key: &&Option<String>| known.iter().any(|(name, _)| Some(*name) == key.as_deref());
             let named = |table: &&Table| table.keys.iter().filter(is_named).count();
             let keyed = |table: &&Table| table.keys.iter().any(Option::is_some) && column(table).is_some();
-            let Some((table, i)) = tables
-                .iter()
-                .rev()
-                .filter(keyed)
-                .max_by_key(named)
-                .and_then(|table| Some((table, column(table)?)))
-            else {
+            let mut own: Vec<&Table> = tables.iter().filter(keyed).collect();
+            own.sort_by_key(|table| std::cmp::Reverse(named(table)));
+            let Some((table, i)) = own.first().and_then(|table| Some((table, column(table)?))) else {
                 let what =
                     format!("the references `{quantity}` are compared with a column of that name, or by a claim");
                 self.at_defaults()
                     .at_least(format!("{quantity}-references"), what, 0.0, 1.0);
                 continue;
             };
-            let number = |value: Option<&Value>| match value {
-                Some(Value::Number(number)) => Some(*number),
-                Some(Value::Integer(count)) => Some(*count as f64),
-                _ => None,
+            let limited = if table.at_full_trials {
+                self.at_full_trials()
+            } else {
+                self.clone()
             };
-            let has_error = table
-                .columns
-                .get(i + 1)
-                .is_some_and(|next| next.name == format!("{}_se", table.columns[i].name));
-            let cells = table.keys.iter().zip(&table.rows).map(|(key, row)| {
-                let error = if has_error { number(row.get(i + 1)) } else { None };
-                (key.clone().unwrap_or_default(), number(row.get(i)).map(|value| Measured::new(value, error)))
-            });
             let statement = table.columns[i].meaning.trim_end_matches('.');
-            self.references(quantity, statement, cells, |cell| cell);
+            let rows = own
+                .iter()
+                .filter_map(|table| Some(cells(table, column(table)?)))
+                .flatten();
+            limited.references(quantity, statement, rows, |cell| cell);
         }
     }
+}
+
+/// The key and the value of each row in a column, with its standard error where the next column holds it.
+fn cells(table: &Table, i: usize) -> impl Iterator<Item = (String, Option<Measured>)> {
+    let number = |value: Option<&Value>| match value {
+        Some(Value::Number(number)) => Some(*number),
+        Some(Value::Integer(count)) => Some(*count as f64),
+        _ => None,
+    };
+    let error = format!("{}_se", table.columns[i].name);
+    let has_error = table.columns.get(i + 1).is_some_and(|next| next.name == error);
+    table.keys.iter().zip(&table.rows).map(move |(key, row)| {
+        let error = if has_error { number(row.get(i + 1)) } else { None };
+        (key.clone().unwrap_or_default(), number(row.get(i)).map(|value| Measured::new(value, error)))
+    })
 }
 
 /// A row that is found by a name: what follows the quantity in the keys of its references. `rows!` writes it.

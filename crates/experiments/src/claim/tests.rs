@@ -165,3 +165,27 @@ fn references_that_nothing_is_compared_with_fail() {
     assert_eq!(compared(&vec![Unkeyed { mse: 0.130_486_15 }], |_| ()), [Verdict::Fail]);
     assert!(compared(&vec![Unkeyed { mse: 0.130_486_15 }], |c| c.shown("mse")).is_empty());
 }
+
+rows! {
+    struct Rare by name at full_trials {
+        method: &'static str => "How.",
+        mse: f64 => "Squared error, no plain average.",
+    }
+}
+
+fn name(row: &Rare) -> String {
+    format!("lloyd-{}", row.method)
+}
+
+/// Its references are found by the function's names.
+#[test]
+fn what_is_no_plain_average_is_compared_at_full_counts_only() {
+    let rows = vec![Rare { method: "x", mse: 0.5 }];
+    for (full, verdict) in [(true, Verdict::Fail), (false, Verdict::Skipped)] {
+        let claims = Claims::about("mi-table4-3", true, full);
+        claims.compare(&Table::of(&rows).unwrap());
+        let made = claims.made();
+        let own = made.iter().find(|claim| claim.id == "mse/lloyd-x").unwrap();
+        assert_eq!((own.verdict, own.value), (verdict, Some(0.5)));
+    }
+}

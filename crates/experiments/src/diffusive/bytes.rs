@@ -49,9 +49,6 @@ impl Figure for Bytes {
 
     fn claims(&self, _: &Settings, rows: &Vec<Summary>, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        let nodes = |r: &Summary| (r.scheme.to_owned(), r.nodes_median);
-        claims.references("nodes_median", "median nodes to the threshold", rows, nodes);
-        claims.references("reach", "share that reaches the threshold", rows, |r| (r.scheme.to_owned(), r.reach));
         let find = |name: &str| rows.iter().find(|r| r.scheme == name);
         let bytes = |name: &str| find(name).and_then(|r| r.bytes_median).map(|m| m.value);
         for other in ["gmm-4", "gaussian-9", "lpg-2x5 known rate"] {

@@ -22,15 +22,16 @@ rows! {
     }
 
     struct Bound {
-        unknown: &'static str => "What is unknown besides the position.",
-        sd_x: f64 ["m"] => "Standard deviation of x at the bound.",
+        unknown: &'static str as x("unknown besides the position") => "What is unknown besides the position.",
+        sd_x: f64 ["m"] as points("of x") in bound => "Standard deviation of x at the bound.",
     }
 
     struct Model by "{model} {nodes}" {
-        model: &'static str => "What is assumed of the rate.",
-        nodes: usize => "Nodes.",
-        bias: Measured ["m"] => "Distance of posterior mean and source, although the samples are free of noise.",
-        width: Measured ["m"] => "Fourth root of the determinant of the covariance.",
+        model: &'static str as key => "What is assumed of the rate.",
+        nodes: usize as x("nodes") => "Nodes.",
+        /// Distance of posterior mean and source, although the samples are free of noise.
+        bias: Measured ["m"] as points("distance") in models,
+        width: Measured ["m"] as dashed("width") in models => "Fourth root of the determinant of the covariance.",
         bias_in_widths: Measured => "Bias in units of the width.",
     }
 }
@@ -51,7 +52,8 @@ impl Figure for Unknowns {
     figure!(Parameters => Rows, "diffusive-unknowns", "What else is unknown", "",
         "Left: the Cramer-Rao bound of x for six nodes on the way to the source of example B with more and more unknowns. Right: posterior \
          means of noise-free samples by what is assumed of the rate. Redrawing the rate for every sample, as the \
-         paper's equations (13) and (18) do, pushes the source away and stays wrong however many nodes there are.");
+         paper's equations (13) and (18) do, pushes the source away and stays wrong however many nodes there are.";
+        { bound: linear("standard deviation / m", "Bound of x"), models: semilog("median distance to the source / m", "Noise-free samples") });
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let sensor = B.sensor(false)?;
@@ -153,25 +155,5 @@ impl Figure for Unknowns {
         paper.below("joint-is-right", what, bias("joint 20").map(|m| m.bias.value), 0.01);
         let order = ["sample-wise 20", "node-wise 20", "joint 20"].map(|key| bias(key).map(|m| m.width.value));
         paper.decreasing("sharper", "what is assumed shared sharpens the posterior", order);
-    }
-
-    fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let bars = rows.bounds.iter().enumerate().map(|(i, b)| (i as f64, b.sd_x));
-        let unknown = Axis::categories("unknown besides the position", rows.bounds.iter().map(|b| b.unknown));
-        let bound = Panel::new("Bound of x", unknown, Axis::linear("standard deviation / m")).with(Layer::bars(
-            "",
-            bars.collect(),
-            0.6,
-        ));
-        let mut bias = Panel::semilog("Noise-free samples", "nodes", "median distance to the source / m");
-        for (c, model) in ["sample-wise", "node-wise", "joint"].into_iter().enumerate() {
-            let of = || select(&rows.models, |m| m.model == model);
-            let width = points(of(), |m| (m.nodes as f64, m.width.value));
-            let bias_of = Layer::measured(model, of(), |m| (m.nodes as f64, m.bias));
-            bias = bias
-                .with(bias_of.coloured(c))
-                .with(Layer::dashed(format!("{model}: width"), width).coloured(c));
-        }
-        Plot::grid(2, vec![bound, bias])
     }
 }

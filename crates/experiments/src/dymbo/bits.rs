@@ -90,8 +90,6 @@ impl Figure for WordLength {
             let losses = curve.iter().map(|r| r.loss);
             here.decreasing(format!("falls-{}-{}", plant.a, plant.gamma), what, losses);
         }
-        let first = rows.words.iter().filter(|r| Some(&r.plant) == p.plants.first());
-        claims.references("information", "information of a word of bits", first, |r| (r.bits.to_string(), r.c));
         let longer = rows.words.iter().filter(|r| r.bits > 1);
         let what = "from two bits on the prediction is exact to 0.03 %";
         here.all("riccati", what, longer, |r| (r.exact_mse / r.riccati - 1.0).abs() <= 3e-4);

@@ -24,26 +24,27 @@ rows! {
     }
 
     struct Row by "{plant} {n}" {
-        plant: Plant,
-        n: usize => "Step.",
-        kf_pred: f64 ["sigma^2"] => "Variance computed by the Kalman filter, which is exact.",
-        kf_mse: Measured ["sigma^2"] => "Mean squared error of the Kalman filter.",
+        plant: Plant as panel("a = {}, gamma = {}"),
+        n: usize as x("step n") => "Step.",
+        kf_pred: f64 ["sigma^2"] as line("Kalman, exact") in errors => "Variance computed by the Kalman filter, which is exact.",
+        kf_mse: Measured ["sigma^2"] as points("Kalman, simulated") in errors => "Mean squared error of the Kalman filter.",
         dymbo_pred: f64 ["sigma^2"] => "Variance computed by the sign-bit filter.",
-        dymbo_mse: Measured ["sigma^2"] => "Mean squared error of the sign-bit filter.",
-        dymbo_exact: f64 ["sigma^2"] => "Exact mean squared error, by the error chain.",
-        dymbo_minf: f64 ["sigma^2"] => "Steady variance of the sign-bit filter.",
+        dymbo_mse: Measured ["sigma^2"] as points("sign bit, simulated") in errors => "Mean squared error of the sign-bit filter.",
+        dymbo_exact: f64 ["sigma^2"] as line("sign bit, exact") in errors => "Exact mean squared error, by the error chain.",
+        dymbo_minf: f64 ["sigma^2"] as dashed("steady, sign bit") in errors => "Steady variance of the sign-bit filter.",
         kf_minf: f64 ["sigma^2"] => "Steady variance of the Kalman filter.",
         nees: Measured => "Squared error over computed variance, sign-bit filter.",
-        informed_mse: Measured ["sigma^2"] => "Mean squared error when the stationary prior is used at n = 0.",
+        /// Mean squared error when the stationary prior is used at n = 0.
+        informed_mse: Measured ["sigma^2"] as points("with prior, simulated") in errors,
         informed_nees: Measured => "Its squared error over computed variance.",
     }
 
     struct Point {
-        plant: Plant,
-        n: usize => "Step.",
-        theta: f64 ["sigma"] => "State.",
-        kf: f64 ["sigma"] => "Estimate of the Kalman filter.",
-        dymbo: f64 ["sigma"] => "Estimate of the sign-bit filter.",
+        plant: Plant as panel("a = {}, gamma = {}"),
+        n: usize as x("step n") => "Step.",
+        theta: f64 ["sigma"] as line("state") in path => "State.",
+        kf: f64 ["sigma"] as dashed("Kalman") in path => "Estimate of the Kalman filter.",
+        dymbo: f64 ["sigma"] as line("sign bit") in path => "Estimate of the sign-bit filter.",
         bit: Option<f64> => "Bit received; none at the first message.",
     }
 }
@@ -105,7 +106,8 @@ impl Figure for Convergence {
         "Mean squared error of the Kalman filter and of the sign-bit filter, simulated (points, one standard error) and \
          exact (lines); the third curve starts from first message and stationary prior together. The level differs \
          by the loss, the convergence by a step or two (erratum dymbo-12); for the slow plant the first message without the \
-         prior is worse than the prior alone.");
+         prior is worse than the prior alone.";
+        { errors: semilog("mean squared error / sigma^2"), path: linear("state / sigma", "One run") });
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let (mut errors, mut path) = (Vec::new(), Vec::new());
@@ -210,33 +212,5 @@ impl Figure for Convergence {
             let what = format!("the ratio of {of} at its peak, a, gamma");
             claims.references(&format!("peak-{id}"), &what, curves(), |c| (c[0].plant.to_string(), peak(c)));
         }
-    }
-
-    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
-        let mut panels = Vec::new();
-        for curve in rows.errors.chunks(p.steps + 1) {
-            let line = |of: fn(&Row) -> f64| points(curve, |r| (r.n as f64, of(r)));
-            let marks = |label: &str, of: fn(&Row) -> Measured| Layer::measured(label, curve, |r| (r.n as f64, of(r)));
-            panels.push(
-                Panel::semilog(curve[0].plant.title(), "step n", "mean squared error / sigma^2")
-                    .with(Layer::line("Kalman, exact", line(|r| r.kf_pred)).coloured(0))
-                    .with(marks("Kalman, simulated", |r| r.kf_mse).coloured(0))
-                    .with(Layer::line("sign bit, exact", line(|r| r.dymbo_exact)).coloured(1))
-                    .with(marks("sign bit, simulated", |r| r.dymbo_mse).coloured(1))
-                    .with(marks("sign bit with prior, simulated", |r| r.informed_mse).coloured(2))
-                    .with(Layer::dashed("sign bit, steady", line(|r| r.dymbo_minf)).coloured(3)),
-            );
-        }
-        for path in rows.path.chunks(p.steps + 1) {
-            let line = |of: fn(&Point) -> f64| points(path, |r| (r.n as f64, of(r)));
-            let title = format!("One run, gamma = {}", path[0].plant.gamma);
-            panels.push(
-                Panel::linear(title, "step n", "state / sigma")
-                    .with(Layer::unbroken("state", line(|r| r.theta)))
-                    .with(Layer::dashed("Kalman", line(|r| r.kf)).coloured(0))
-                    .with(Layer::line("sign bit", line(|r| r.dymbo)).coloured(1)),
-            );
-        }
-        Plot::grid(p.gamma.len().min(2), panels)
     }
 }

@@ -21,18 +21,18 @@ rows! {
     }
 
     struct Row by "{tau}" {
-        tau: f64 ["unit"] => "Resolution of the first message.",
-        exact_sup: f64 ["unit^2"] => "Mean squared error at the worst state.",
-        tight: f64 ["unit^2"] => "Variance to start from, sigma^2 + tau^2/12.",
-        printed_bound: f64 ["unit^2"] => "The paper's bound, (sigma + tau/2)^2.",
+        tau: f64 ["unit"] as x("resolution tau") => "Resolution of the first message.",
+        exact_sup: f64 ["unit^2"] as points("exact, worst state") in message => "Mean squared error at the worst state.",
+        tight: f64 ["unit^2"] as line("sigma^2 + tau^2/12") in message => "Variance to start from, sigma^2 + tau^2/12.",
+        printed_bound: f64 ["unit^2"] as dashed("printed bound") in message => "The paper's bound, (sigma + tau/2)^2.",
     }
 
-    struct Start by "{start} {gamma}" {
-        gamma: f64 => "Process variance over measurement variance.",
-        n: usize => "Step.",
-        start: &'static str => "Initial variance: tight or printed.",
-        mse: f64 ["unit^2"] => "Exact mean squared error.",
-        nees: f64 => "Exact error over computed variance.",
+    struct Start by "{start} {gamma} {n}" {
+        gamma: f64 as key("gamma = {}") => "Process variance over measurement variance.",
+        n: usize as x("step n") => "Step.",
+        start: &'static str as key("{} start") => "Initial variance: tight or printed.",
+        mse: f64 ["unit^2"] => "Exact mean squared error (erratum dymbo-7).",
+        nees: f64 as line in start => "Exact error over computed variance (erratum dymbo-7).",
     }
 }
 
@@ -42,7 +42,8 @@ impl Figure for FirstMessage {
     figure!(Parameters => Rows, "dymbo-prop2", "The fine first message", "Ribeiro and Giannakis, Proposition 2",
         "Mean squared error of the first sample rounded to a multiple of tau, at the worst place of the state: exact, \
          sigma^2 + tau^2/12, and the paper's bound (sigma + tau/2)^2. The bound is valid but loose; a filter that \
-         starts from it (right) is over-cautious for several steps (erratum dymbo-7).");
+         starts from it (right) is over-cautious for several steps (erratum dymbo-7).";
+        { message: loglog("mean squared error", "First message"), start: linear("exact error / computed variance", "Consistency after the start") });
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let noise = p.sigma * p.sigma;
@@ -79,35 +80,10 @@ impl Figure for FirstMessage {
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
         let messages = &rows.messages;
         claims.all("valid", "the printed bound is valid (Minkowski)", messages, |r| r.printed_bound >= r.exact_sup);
-        claims.keyed("exact", "worst mean squared error at tau", messages, |r| r.exact_sup);
         let one = messages.iter().find(|r| r.tau == p.sigma);
         let what = "at tau = sigma the printed bound is 2.08 times the truth (erratum dymbo-7)";
         claims.near("loose", what, one.map(|r| r.printed_bound / r.exact_sup), 2.0769, 2e-4);
         let what = "tau = sigma already costs only 8.3 % (erratum dymbo-8)";
         claims.near("cheap", what, one.map(|r| r.exact_sup / (p.sigma * p.sigma)), 1.0833, 1e-4);
-        let at = |n: usize| rows.starts.iter().filter(move |r| r.n == n);
-        claims.keyed("first-bit", "error after one bit from this variance (erratum dymbo-7)", at(1), |r| r.mse);
-        let cautious = rows.starts.iter().filter(|r| r.start == "printed" && r.gamma == 0.5);
-        let what = "normalised error from the printed bound at gamma = 0.5, step (erratum dymbo-7)";
-        claims.references("cautious", what, cautious, |r| (r.n.to_string(), r.nees));
-    }
-
-    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
-        let curve = |of: fn(&Row) -> f64| points(&rows.messages, |r| (r.tau, of(r)));
-        let left = Panel::loglog("First message", "resolution tau", "mean squared error")
-            .with(Layer::points("exact, worst state", curve(|r| r.exact_sup)).coloured(0))
-            .with(Layer::line("sigma^2 + tau^2/12", curve(|r| r.tight)).coloured(0))
-            .with(Layer::dashed("printed bound", curve(|r| r.printed_bound)).coloured(1));
-        let mut right = Panel::linear("Consistency after the start", "step n", "exact error / computed variance");
-        for (i, &gamma) in p.gamma.iter().enumerate() {
-            let of = |start: &str| {
-                let those = rows.starts.iter().filter(|r| r.gamma == gamma && r.start == start);
-                points(those, |r| (r.n as f64, r.nees))
-            };
-            right = right
-                .with(Layer::line(format!("tight start, gamma = {gamma}"), of("tight")).coloured(2 * i))
-                .with(Layer::dashed(format!("printed start, gamma = {gamma}"), of("printed")).coloured(2 * i + 1));
-        }
-        Plot::grid(2, vec![left, right])
     }
 }

@@ -20,7 +20,7 @@ parameters! {
 }
 
 rows! {
-    pub struct Row by "{method}-t{t}" {
+    pub struct Row by "{method}-t{t}" at full_trials {
         t: usize => "Time.",
         /// What is handed on: a cut by ml, kl or l1; the estimate (kde_only); particles (raw_pf); one Gaussian (gauss).
         method: &'static str,
@@ -45,7 +45,7 @@ rows! {
         ml_bound: Measured ["nat"],
     }
 
-    struct Difference by "{pair}-t{t}" {
+    struct Difference by "{pair}-t{t}" at full_trials {
         t: usize => "Time.",
         pair: &'static str => "Which.",
         kl: Measured ["nat"] => "Difference of their errors, world by world.",
@@ -186,12 +186,7 @@ impl Figure for Fig6c {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
-        let (here, full) = (claims.at_defaults(), claims.at_full_trials());
-        let paper = here.at_full_trials();
-        full.keyed("kl", "actual error", &rows.error, |r| r.kl_increase);
-        let before = rows.error.iter().filter_map(|r| Some((r, r.before_reduction?)));
-        full.references("before", "error before the reduction", before, |(r, m)| (format!("{}-t{}", r.method, r.t), m));
-        full.keyed("difference", "paired difference", &rows.difference, |d| d.kl);
+        let (here, paper) = (claims.at_defaults(), claims.at_defaults().at_full_trials());
         let pair = |pair: &'static str| rows.difference.iter().filter(move |d| d.pair == pair);
         paper.all("ml-behind", "ML is behind KL at every time", pair("ml-kl"), |d| d.kl.value > 0.0);
         let what = "KL and L1 are the same within 0.015 nat and three standard errors";

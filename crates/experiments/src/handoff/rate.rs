@@ -17,7 +17,7 @@ parameters! {
 }
 
 rows! {
-    pub struct Row {
+    pub struct Row by name {
         /// What is sent: coded, f32 (mixture parameters as floats), coded-kd (a cut by KL, coded), particles (f32, resampled).
         message: &'static str,
         size: usize => "Components, or particles.",
@@ -28,6 +28,12 @@ rows! {
 }
 
 pub struct Rate;
+
+/// Name of a message.
+fn name(row: &Row) -> String {
+    let resolution = row.resolution.map_or(String::new(), |r| format!("-r{r}"));
+    format!("{}-{}{resolution}", row.message, row.size)
+}
 
 fn find<'a>(rows: &'a [Row], message: &str, size: usize, resolution: Option<f64>) -> Option<&'a Row> {
     first(rows, |r| r.message == message && r.size == size && r.resolution == resolution)
@@ -81,12 +87,6 @@ impl Figure for Rate {
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let (here, paper) = (claims.at_defaults(), claims.at_defaults().at_full_trials());
-        let key = |r: &Row| {
-            let resolution = r.resolution.map_or(String::new(), |r| format!("-r{r}"));
-            format!("{}-{}{resolution}", r.message, r.size)
-        };
-        claims.references("bits", "length", rows, |r| (key(r), r.bits));
-        claims.references("kl", "KL", rows, |r| (key(r), r.kl));
         let bits = |message: &str, size, step| find(rows, message, size, step).map(|r| r.bits);
         let kl = |message: &str, size, step| find(rows, message, size, step).map(|r| r.kl);
         let share = over(bits("coded", 5, Some(0.25)), bits("f32", 5, None));

@@ -16,7 +16,7 @@ parameters! {
 }
 
 rows! {
-    pub struct Row by "{method}-m{components}" {
+    pub struct Row by "{method}-m{components}" at full_trials {
         method: &'static str as key => "Method.",
         components: usize as x("components M") => "The most components.",
         kl: Measured ["nat"] as points => "KL from the estimate to the mixture, by quadrature.",
@@ -103,9 +103,8 @@ impl Figure for Reductions {
     }
 
     fn claims(&self, p: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
-        let (full, paper) = (claims.at_full_trials(), claims.at_defaults().at_full_trials());
+        let paper = claims.at_defaults().at_full_trials();
         let kl = |method: &str, m: usize| first(rows, |r| r.method == method && r.components == m).map(|r| r.kl.value);
-        full.keyed("kl", "KL", rows, |r| r.kl);
         for m in p.components.iter().copied().filter(|m| *m >= 3) {
             let ratio = over(kl("pipeline 15", m), kl("kd kl", m));
             let what = "the recommended pipeline loses at most 0.65 of what the paper's cut does";

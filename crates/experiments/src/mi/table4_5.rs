@@ -181,7 +181,6 @@ impl Figure for Mismatch {
 
     fn claims(&self, p: &Parameters, tables: &Mismatches, claims: &mut Claims) {
         let here = claims.at_defaults();
-        claims.keyed("at-printed", "printed design at 0.05", &tables.printed, |r| r.mse);
         let natural = select(&tables.printed, |r| r.labelling == "natural");
         let what = "the printed 0.497 is natural words' value at the printed breakpoints to 0.3 %";
         claims.references("printed", what, natural, |r| (format!("{} 0 0.05", r.labelling), r.mse));

@@ -1,6 +1,6 @@
 //! `mpa-ablation`: improved message passing with one erratum put back at a time.
 
-use super::scores::{self, Row, agree, ladder, mse};
+use super::scores::{self, Row, ladder, mse};
 use super::sweeps::SPEED;
 use super::world::{Method, Point};
 use crate::prelude::*;
@@ -68,7 +68,6 @@ impl Figure for Ablation {
 
     fn claims(&self, _: &Parameters, t: &Vec<Row>, claims: &mut Claims) {
         let paper = claims.at_defaults().at_full_trials();
-        agree(claims, t, "");
         let ratio = |name: &str| Some(mse(t, "50dB", name)? / mse(t, "50dB", "improved")?);
         let what = "transferring velocities costs half as much again (erratum mpa-7)";
         paper.above("transfer", what, ratio("transfer"), 1.25);

@@ -1,6 +1,6 @@
 //! `mpa-encoder`: the published reference, the predicted one, and cells that adapt to what is known.
 
-use super::scores::{Row, agree, find, mse, rows};
+use super::scores::{Row, find, mse, rows};
 use super::sweeps::SPEED;
 use super::world::{Method, Point};
 use crate::prelude::*;
@@ -68,8 +68,6 @@ impl Figure for Encoders {
 
     fn claims(&self, _: &Parameters, t: &Rows, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        agree(claims, &t.encoders, "");
-        agree(claims, &t.loadings, "loading-");
         let grid = |name: &str, point: &str| mse(&t.encoders, &format!("{name} {point}"), "grid-15");
         for (point, factor) in [("50dB-L4", 20.0), ("40dB-L4", 8.0), ("30dB-L4", 2.4)] {
             let gain = over(grid("published", point), grid("adaptive", point));

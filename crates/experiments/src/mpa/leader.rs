@@ -15,12 +15,12 @@ parameters! {
 }
 
 rows! {
-    pub struct Row by "{snr_db}dB-N{particles}" {
+    pub struct Row by "{snr_db}dB-N{particles}" at full_trials {
         snr_db: f64 ["dB"] => "Ratio of the powers of range and noise.",
         particles: usize => "Particles.",
         one: Measured => "Share of steps with one claimant.",
-        none: Measured => "With none.",
-        several: Measured => "With several.",
+        none: Measured => "Share of steps with no claimant.",
+        several: Measured => "Share of steps with several claimants.",
         nearest: Measured => "Share of steps in which the true nearest sensor leads.",
         mse: Measured => "Mean squared position error of the leader's estimate.",
         spread: Measured => "Variance of the sensors' estimates about their mean, both axes.",
@@ -88,12 +88,6 @@ impl Figure for Leaders {
     }
 
     fn claims(&self, _: &Parameters, t: &Vec<Row>, claims: &mut Claims) {
-        let full = claims.at_full_trials();
-        full.keyed("one", "share with one claimant", t, |r| r.one);
-        full.keyed("none", "share without", t, |r| r.none);
-        full.keyed("several", "share with several", t, |r| r.several);
-        full.keyed("nearest", "share led by the truly nearest", t, |r| r.nearest);
-        full.keyed("spread", "variance between the copies", t, |r| r.spread);
         claims.all("sum", "every step has one, none or several", t, |r| {
             (r.one.value + r.none.value + r.several.value - 1.0).abs() < 1e-9
         });

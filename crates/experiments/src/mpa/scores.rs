@@ -28,7 +28,7 @@ impl Effort {
 
 rows! {
     /// One tracker at one point.
-    pub struct Row by "{point} {method}" {
+    pub struct Row by "{point} {method}" at full_trials {
         pub(super) point: String => "Which setting.",
         pub(super) snr_db: f64 ["dB"] => "Ratio of the powers of range and noise.",
         pub(super) levels: usize => "Levels of the quantizer.",
@@ -67,14 +67,6 @@ pub(super) fn rows(
         score: Score::of(all.iter().filter_map(|errors| errors[m]).collect()),
     };
     Ok(methods.iter().enumerate().map(row).collect())
-}
-
-/// The references of means, medians and lost shares that a figure has.
-pub(super) fn agree(claims: &Claims, rows: &[Row], prefix: &str) {
-    let full = claims.at_full_trials();
-    full.keyed(&format!("{prefix}mse"), "mean squared position error", rows, |r| r.score.mse);
-    full.keyed(&format!("{prefix}median"), "median of the squared position error", rows, |r| r.score.median);
-    full.keyed(&format!("{prefix}lost"), "share of lost tracks", rows, |r| r.score.lost);
 }
 
 /// The axis of squared position errors.

@@ -1,6 +1,6 @@
 //! `mpa-table3-mse`, `mpa-fig3-4`, `mpa-fig3-5`, `mpa-table3-low`: all trackers over particles, levels and noise.
 
-use super::scores::{Effort, GAUSSIAN, MSE, Row, agree, clouds, deterministic, find, ladder, messages, mse, rows};
+use super::scores::{Effort, GAUSSIAN, MSE, Row, clouds, deterministic, find, ladder, messages, mse, rows};
 use super::world::{LAYOUTS, Method, Point};
 use crate::prelude::*;
 use fewbits_baselines::pf_mpa::Reports;
@@ -76,9 +76,6 @@ impl Figure for Mse {
 
     fn claims(&self, _: &Effort, t: &Mses, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        agree(claims, &t.trackers, "");
-        agree(claims, &t.speeds, "speed-");
-        agree(claims, &t.layouts, "layout-");
         full.keyed("floor-mse", "mean squared position error", &t.floor, |r| r.score.mse);
         let value = |method: &str| mse(&t.trackers, "50dB-L4", method);
         let order = ["grid-15", "guided-40", "GMPA", "GMPA-transfer"].map(value);
@@ -163,7 +160,6 @@ impl Figure for Fig34 {
 
     fn claims(&self, _: &Effort, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        agree(claims, t, "");
         // Of three particles the other program loses more tracks.
         full.no_more()
             .keyed("lost-most", "share of lost tracks", t, |r| r.score.lost);
@@ -230,7 +226,6 @@ impl Figure for Fig35 {
 
     fn claims(&self, _: &Effort, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        agree(claims, t, "");
         for (method, what) in [
             ("improved-40", "improved message passing"),
             ("GMPA", "Gaussian message passing"),
@@ -290,7 +285,6 @@ impl Figure for Low {
 
     fn claims(&self, _: &Effort, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        agree(claims, t, "");
         // Of three particles the other program loses more tracks.
         full.no_more()
             .keyed("lost-most", "share of lost tracks", t, |r| r.score.lost);

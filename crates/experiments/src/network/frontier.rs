@@ -28,9 +28,9 @@ rows! {
         energy: Measured ["J"] => "Energy of all radios in a slot.",
         /// What no scheme can beat with so many payload bits and no information in silence (scalar), or with all measurements (plane).
         floor: f64,
-        best_by_payload: &'static str => "Nothing else has a smaller error with at most as many payload bits.",
-        best_by_air: &'static str => "The same by bits on air.",
-        best_by_energy: &'static str => "The same by energy.",
+        best_by_payload: Answer => "Nothing else has a smaller error with at most as many payload bits.",
+        best_by_air: Answer => "The same by bits on air.",
+        best_by_energy: Answer => "The same by energy.",
     }
 }
 
@@ -42,7 +42,7 @@ fn floor_at(rate: f64, [before, after]: [f64; 2]) -> f64 {
     (after + (before - after) / (4.0_f64.powf(rate) - COEFFICIENT * COEFFICIENT)).sqrt()
 }
 
-fn marks(rows: &[Row], of: impl Fn(&Row) -> f64) -> Vec<&'static str> {
+fn marks(rows: &[Row], of: impl Fn(&Row) -> f64) -> Vec<Answer> {
     let beaten = |row: &Row| {
         rows.iter().any(|other| {
             other.world == row.world
@@ -51,7 +51,7 @@ fn marks(rows: &[Row], of: impl Fn(&Row) -> f64) -> Vec<&'static str> {
                 && (of(other) < of(row) || other.rmse.value < row.rmse.value)
         })
     };
-    rows.iter().map(|row| if beaten(row) { "no" } else { "yes" }).collect()
+    rows.iter().map(|row| Answer(!beaten(row))).collect()
 }
 
 impl Figure for Frontier {
@@ -81,9 +81,9 @@ impl Figure for Frontier {
                     air: moments(|bill| bill.air).into(),
                     energy: moments(|bill| bill.joules).into(),
                     floor: floor(payload.value),
-                    best_by_payload: "",
-                    best_by_air: "",
-                    best_by_energy: "",
+                    best_by_payload: Answer(false),
+                    best_by_air: Answer(false),
+                    best_by_energy: Answer(false),
                 }
             };
             Ok(entries.iter().enumerate().map(row).collect())
@@ -135,13 +135,13 @@ impl Figure for Frontier {
         let quiet =
             |r: &&Row| r.scheme == "adaptive" && ["delta=0.5", "delta=1", "delta=2"].contains(&r.setting.as_str());
         let what = "silence within +-0.5 to 2 of what both ends predict: nothing has less error for less energy";
-        full.all("adaptive", what, rows.iter().filter(quiet), |r| r.best_by_energy == "yes");
+        full.all("adaptive", what, rows.iter().filter(quiet), |r| r.best_by_energy.0);
         claims.below("silence", "one message a slot costs less energy than four sensors of one bit", silent, 1.0);
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
         type Of = fn(&Row) -> f64;
-        type Mark = fn(&Row) -> &'static str;
+        type Mark = fn(&Row) -> Answer;
         let axes: [(&str, Of, Mark); 3] = [
             ("payload / (bit/slot)", |r| r.payload.value, |r| r.best_by_payload),
             ("bits on air / (bit/slot)", |r| r.air.value, |r| r.best_by_air),
@@ -166,7 +166,7 @@ impl Figure for Frontier {
                     let rows = here().filter(|r| r.scheme == *family);
                     panel = panel.with(Layer::measured(*family, rows, |r| (of(r), r.rmse)).coloured(colour));
                 }
-                let mut frontier: Vec<_> = here().filter(|r| best(r) == "yes").collect();
+                let mut frontier: Vec<_> = here().filter(|r| best(r).0).collect();
                 frontier.sort_by(|a, b| of(a).total_cmp(&of(b)));
                 // Names nearer than a factor of 1.6 would hide one another.
                 let mut names: Vec<(f64, f64, String)> = Vec::new();

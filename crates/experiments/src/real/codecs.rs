@@ -24,19 +24,20 @@ rows! {
     }
 
     struct Row {
-        column: String => "Signal.",
-        percent: f64 => "Largest error in percent of the range.",
-        adaptive: f64 ["bit"] => "Block of the adaptive codec, without container.",
+        column: String as panel => "Signal.",
+        percent: f64 as x("largest error, percent of the range") => "Largest error in percent of the range.",
+        adaptive: f64 ["bit"] as line("adaptive") in signals => "Block of the adaptive codec, without container.",
         worst: f64 => "Largest error of its restored samples over the bound.",
-        pco: f64 ["bit"] => "pco 1 on the indices of a lattice of twice the bound, its delta order found by itself.",
+        /// pco 1 on the indices of a lattice of twice the bound, its delta order found by itself.
+        pco: f64 ["bit"] as line("pco") in signals,
         /// zstd, level 19, on those indices as 32-bit numbers; without the feature `zstd` of this crate not run.
-        zstd: Option<f64> ["bit"],
+        zstd: Option<f64> ["bit"] as line("zstd") in signals,
     }
 
     struct Reference {
-        percent: f64 => "Largest error in percent of the range.",
-        codec: &'static str => "Program.",
-        bits: f64 ["bit"] => "Mean bits per sample.",
+        percent: f64 as x("largest error, percent of the range") => "Largest error in percent of the range.",
+        codec: &'static str as key => "Program.",
+        bits: f64 ["bit"] as dashed in others => "Mean bits per sample.",
     }
 }
 
@@ -86,7 +87,8 @@ impl Figure for Codecs {
     figure!(Parameters => Rows, "real-codecs", "Bits against the bound, beside other codecs", "our own comparison",
         "Bits per sample against the guaranteed largest error, on signals with the traits of recordings, or on the columns of a \
          file: a block of the adaptive codec, pco on lattice indices, and with the feature `zstd` zstd on them. Dashed: means of \
-         programs that are no crates over recorded series, from the page of recordings.");
+         programs that are no crates over recorded series, from the page of recordings.";
+        { signals: loglog("bits per sample"), others: loglog("bits per sample", "Recorded series") });
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let recordings = p.source.load("real-codecs", context)?;
@@ -109,27 +111,5 @@ impl Figure for Codecs {
         claims.at_most("bounded", "no error exceeds the bound", worst, 1.0 + 1e-9);
         let ratio = geometric_mean(rows.signals.iter().map(|row| row.adaptive / row.pco));
         claims.at_most("pco", "fewer bits than pco on lattice indices, in the geometric mean", ratio, 1.0);
-    }
-
-    fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let columns = distinct(&rows.signals, |row| row.column.clone());
-        let panel = |column: &String| {
-            let chosen = || rows.signals.iter().filter(|row| row.column == *column);
-            let zstd = chosen().filter_map(|row| Some((row.percent, row.zstd?)));
-            let zstd: Vec<(f64, f64)> = zstd.collect();
-            let mut layers = vec![
-                Layer::line("adaptive", points(chosen(), |row| (row.percent, row.adaptive))).coloured(0),
-                Layer::line("pco", points(chosen(), |row| (row.percent, row.pco))).coloured(1),
-            ];
-            if !zstd.is_empty() {
-                layers.push(Layer::line("zstd", zstd).coloured(2));
-            }
-            layers.extend(REFERENCES.iter().enumerate().map(|(i, (codec, _))| {
-                let curve = rows.references.iter().filter(|row| row.codec == *codec);
-                Layer::dashed(*codec, points(curve, |row| (row.percent, row.bits))).coloured(3 + i)
-            }));
-            Panel::loglog(column, "largest error, percent of the range", "bits per sample").with_all(layers)
-        };
-        Plot::grid(3, columns.iter().map(panel).collect())
     }
 }

@@ -27,13 +27,13 @@ parameters! {
 rows! {
     pub struct Row {
         column: String => "Signal.",
-        loss: f64 => "Probability that a packet is lost.",
-        refresh: u64 => "Slots from one refresh to the next.",
-        bits: Measured ["bit"] => "Whole bits per sample, counters and refreshes included.",
-        rmse: Measured => "Root mean square error over delta.",
-        beyond: Measured => "Share of the slots whose error exceeds delta.",
+        loss: f64 as key("loss {}") => "Probability that a packet is lost.",
+        refresh: u64 as x("slots from refresh to refresh") => "Slots from one refresh to the next.",
+        bits: Measured ["bit"] as points in bits => "Whole bits per sample, counters and refreshes included.",
+        rmse: Measured as points in errors => "Root mean square error over delta.",
+        beyond: Measured as points in beyond => "Share of the slots whose error exceeds delta.",
         /// Share of the slots whose error exceeds delta although the receiver believes to be in step.
-        unnoticed: Measured,
+        unnoticed: Measured as points in unnoticed,
         /// Slots from the first packet lost to the next refresh received, at the longest, over the interval of refreshes.
         longest: f64,
         violations: u64 => "Errors beyond delta while no packet was lost since the last refresh that arrived: never.",
@@ -102,7 +102,9 @@ fn one(point: &Point<'_>, trial: Trial) -> Result<Outcome, Error> {
 impl Figure for Loss {
     figure!(Parameters => Vec<Row>, "real-loss", "Real signals: loss and recovery", "our own comparison",
         "A lost packet leaves the receiver out of step until the next refresh that arrives. Frequent refreshes cost bits \
-         and shorten that time; the counter of the packets tells the receiver in which slots it must not trust itself.");
+         and shorten that time; the counter of the packets tells the receiver in which slots it must not trust itself.";
+        { bits: semilogx("bits per sample"), errors: loglog("rms error / delta"),
+          beyond: semilogx("share of slots beyond delta"), unnoticed: semilogx("share beyond delta, unnoticed") });
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let recordings = p.source.load("real-loss", context)?;
@@ -154,23 +156,5 @@ impl Figure for Loss {
         here.decreasing("price", "and more bits are spent", worst().map(|r| r.bits));
         let what = "most wrong slots are known to be so";
         here.all("noticed", what, worst(), |r| r.unnoticed.value < 0.5 * r.beyond.value);
-    }
-
-    fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
-        let panel = |label: &str, y: fn(&Row) -> Measured, axis: fn(String) -> Axis| {
-            let layer = |loss: &f64| {
-                let chosen = rows.iter().filter(move |r| r.loss == *loss);
-                Layer::measured(format!("loss {loss}"), chosen, |r| (r.refresh as f64, y(r)))
-            };
-            Panel::new("", Axis::log("slots from refresh to refresh"), axis(label.into()))
-                .with_all(p.loss.iter().map(layer))
-        };
-        let panels = [
-            panel("bits per sample", |r| r.bits, Axis::linear),
-            panel("rms error / delta", |r| r.rmse, Axis::log),
-            panel("share of slots beyond delta", |r| r.beyond, Axis::linear),
-            panel("share beyond delta, unnoticed", |r| r.unnoticed, Axis::linear),
-        ];
-        Plot::grid(3, panels.into())
     }
 }

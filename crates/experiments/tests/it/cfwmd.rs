@@ -51,7 +51,7 @@ fn fig1(particles: u64, trials: u64) -> [[Measured; 3]; 2] {
 }
 
 fn assert_row(scheme: &str, own: [Measured; 3]) {
-    for (quantity, own) in ["position", "velocity", "rate"].into_iter().zip(own) {
+    for (quantity, own) in ["position_rmse", "velocity_rmse", "rate"].into_iter().zip(own) {
         assert_agrees(&format!("cfwmd-cost/{quantity}/{scheme}, l = 1"), own);
     }
 }

@@ -374,3 +374,12 @@ fn vectors_lose_little_to_the_exact_posterior() {
     let in_turn = assert_arrangement::<3>("three in turn", false);
     assert!(in_turn < assert_arrangement::<3>("three at once", true));
 }
+
+/// Exact steady error over that of the Kalman filter.
+#[test]
+fn exact_loss_is_that_of_another_program() {
+    for (a, gamma) in [(0.9, 0.5), (0.9, 1.0), (1.0, 1.0)] {
+        let loss = chain::true_loss(&ScalarPlant::with_noise_ratio(a, gamma).unwrap()).unwrap();
+        assert_agrees(&format!("dymbo-loss/exact/{a} {gamma}"), exact(loss));
+    }
+}

@@ -139,7 +139,7 @@ fn over_udp(reports: Reports, steps: usize) {
     // All sensors have said where they are before the first slot.
     let mut known = HashSet::new();
     while known.len() < count as usize {
-        let (from, bytes) = socket.receive(Duration::from_secs(20)).unwrap().unwrap();
+        let (from, bytes) = socket.receive(Duration::from_secs(60)).unwrap().unwrap();
         station.on_datagram(from, bytes, &mut Vec::new()).unwrap();
         known.insert(from);
     }

@@ -1,7 +1,7 @@
 //! The tracker against integration over the joint state, and against the printed association of two targets.
 
 use fewbits_baselines::pf_mpa::association::{AssociationRule, update};
-use fewbits_core::factor::{Factor, InCell, Scalar, Value};
+use fewbits_core::factor::{Factor, Levels, Scalar, Value};
 use fewbits_core::{Cell, Dynamics, Gaussian, Observed, Sensing};
 use fewbits_models::{Ar1, LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::Stream;
@@ -31,7 +31,7 @@ fn value(z: f64, variance: f64) -> Seen {
 }
 
 fn cell(lower: f64, upper: f64, variance: f64) -> Seen {
-    let factor = InCell::certain(Cell::new(lower, upper).unwrap(), variance).unwrap();
+    let factor = Levels::certain(Cell::new(lower, upper).unwrap(), variance).unwrap();
     Observed::new(LinearSensor::direct(variance).unwrap(), factor.into())
 }
 
@@ -226,7 +226,7 @@ fn a_target_is_found_kept_and_dropped() {
                 seen.push(Cell::new(at, at + unit).unwrap());
                 let seen: Vec<_> = seen
                     .iter()
-                    .map(|cell| Observed::new(sensor, InCell::certain(*cell, 0.25 * unit * unit).unwrap()))
+                    .map(|cell| Observed::new(sensor, Levels::certain(*cell, 0.25 * unit * unit).unwrap()))
                     .collect();
                 let reports: Vec<_> = seen
                     .iter()

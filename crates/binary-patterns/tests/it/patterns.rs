@@ -1,0 +1,29 @@
+//! Which sets of patterns separate the cells.
+
+use fewbits_binary_patterns::{Pattern, check_separation, generator_matrix, gray_basis, linear_pattern};
+
+#[test]
+fn neighbouring_cells_of_gray_patterns_differ_in_one_bit() {
+    for bits in 1..=8 {
+        let matrix = generator_matrix(&gray_basis(bits).unwrap(), bits).unwrap();
+        for pair in matrix.windows(2) {
+            assert_eq!(pair[0].iter().zip(&pair[1]).filter(|(a, b)| a != b).count(), 1, "{bits} bits");
+        }
+    }
+}
+
+/// Columns 5 to 7 of the thesis's generator matrix (5.6) beside the Gray basis.
+#[test]
+fn further_patterns_separate_with_the_gray_basis() {
+    let masks = gray_basis(4).unwrap().into_iter().chain([14, 5, 11]);
+    let patterns: Vec<Pattern> = masks.map(|mask| linear_pattern(mask, 4).unwrap()).collect();
+    check_separation(&patterns).unwrap();
+}
+
+/// Independent over GF(2), yet two cells carry the same column: footnote 2 of the thesis holds for linear patterns only (erratum
+/// binary-3).
+#[test]
+fn independent_patterns_that_are_not_linear_need_not_separate() {
+    let patterns = ["00001111", "00110000", "01000000"].map(|text| text.parse::<Pattern>().unwrap());
+    check_separation(&patterns).unwrap_err();
+}
