@@ -13,37 +13,45 @@ pub(crate) enum Likelihoods {
 }
 
 impl Likelihoods {
-    pub(crate) fn parsed(given: &Bound<'_, PyAny>) -> Outcome<Self> {
+    pub(crate) fn parsed(argument: &'static str, given: &Bound<'_, PyAny>) -> Outcome<Self> {
         let expected = "a function of states and observation, or a dictionary of such functions by column";
         if given.is_callable() {
             return Ok(Self::One(given.clone().unbind()));
         }
         let Ok(named) = given.cast::<PyDict>() else {
-            return refused("likelihood", given.get_type().name()?, expected);
+            return refused(argument, given.get_type().name()?, expected);
         };
         let mut functions = Vec::with_capacity(named.len());
         for (name, function) in named {
             if !function.is_callable() {
-                return refused("likelihood", function.get_type().name()?, expected);
+                return refused(argument, function.get_type().name()?, expected);
             }
             functions.push((name.extract()?, function.unbind()));
         }
         if functions.is_empty() {
-            return refused("likelihood", "an empty dictionary", expected);
+            return refused(argument, "an empty dictionary", expected);
         }
         Ok(Self::ByName(functions))
     }
 
-    /// The functions of one instant with their observations; none if all are missing.
+    /// The names of the columns; one without a name if there is one function.
+    pub(crate) fn names(&self) -> Vec<Option<&str>> {
+        match self {
+            Self::One(_) => vec![None],
+            Self::ByName(functions) => functions.iter().map(|(name, _)| Some(name.as_str())).collect(),
+        }
+    }
+
+    /// The functions of one instant with their places and observations; none if all are missing.
     pub(crate) fn of<'py>(
         &self,
         observation: Option<&Bound<'py, PyAny>>,
-    ) -> Outcome<Vec<(&Py<PyAny>, Bound<'py, PyAny>)>> {
+    ) -> Outcome<Vec<(usize, &Py<PyAny>, Bound<'py, PyAny>)>> {
         let Some(observation) = observation.filter(|observation| !is_missing(observation)) else {
             return Ok(Vec::new());
         };
         match self {
-            Self::One(function) => Ok(vec![(function, observation.clone())]),
+            Self::One(function) => Ok(vec![(0, function, observation.clone())]),
             Self::ByName(functions) => {
                 let Ok(observed) = observation.cast::<PyDict>() else {
                     let expected = "a dictionary of observations by name, as the likelihoods";
@@ -52,12 +60,12 @@ impl Likelihoods {
                 let mut all = Vec::with_capacity(observed.len());
                 for (name, one) in observed {
                     let name: String = name.extract()?;
-                    let Some((_, function)) = functions.iter().find(|(known, _)| *known == name) else {
+                    let Some(at) = functions.iter().position(|(known, _)| *known == name) else {
                         let known: Vec<&str> = functions.iter().map(|(known, _)| known.as_str()).collect();
                         return refused("observation", format!("'{name}'"), format!("one of {}", known.join(", ")));
                     };
                     if !is_missing(&one) {
-                        all.push((function, one));
+                        all.push((at, &functions[at].1, one));
                     }
                 }
                 Ok(all)

@@ -2,9 +2,9 @@
 
 use crate::callbacks::{Likelihoods, returned, rising};
 use crate::error::{Outcome, refused};
+use crate::nodes::{Kept, callable, dt_of, step};
 use crate::table::{Given, Table, doubles};
-use fewbits_filters::{Error, PointMass, TransitionKernel, UniformGrid};
-use fewbits_numerics::kernels::largest_number;
+use fewbits_filters::{PointMass, TransitionKernel, UniformGrid};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 
@@ -29,8 +29,7 @@ pub(crate) struct GridFilter {
     deviation: Py<PyAny>,
     likelihoods: Likelihoods,
     belief: PointMass,
-    /// The kernel of the last step, and its seconds.
-    kernel: Option<(f64, TransitionKernel)>,
+    kernel: Kept<TransitionKernel>,
 }
 
 #[pymethods]
@@ -46,11 +45,8 @@ impl GridFilter {
         spacing: f64,
         start: &Bound<'_, PyAny>,
     ) -> Outcome<Self> {
-        for (name, function) in [("mean", mean), ("deviation", deviation)] {
-            if !function.is_callable() {
-                return refused(name, function.get_type().name()?, "a function of the nodes and seconds");
-            }
-        }
+        callable("mean", mean)?;
+        callable("deviation", deviation)?;
         let grid = UniformGrid::new(lower, upper, spacing)?;
         let belief = match start.extract::<(f64, f64)>() {
             Ok((mean, deviation)) => PointMass::normal(grid, mean, deviation * deviation)?,
@@ -68,7 +64,7 @@ impl GridFilter {
         Ok(Self {
             mean: mean.clone().unbind(),
             deviation: deviation.clone().unbind(),
-            likelihoods: Likelihoods::parsed(likelihood)?,
+            likelihoods: Likelihoods::parsed("likelihood", likelihood)?,
             belief,
             kernel: None,
         })
@@ -78,35 +74,10 @@ impl GridFilter {
     /// likelihoods by name the observation is a dictionary. A step that fails leaves the density as it was.
     #[pyo3(signature = (observation=None, *, dt=1.0))]
     fn step(&mut self, py: Python<'_>, observation: Option<Bound<'_, PyAny>>, dt: f64) -> Outcome<f64> {
-        if !(dt >= 0.0 && dt.is_finite()) {
-            return refused("dt", dt, "a finite number, 0 or above");
-        }
-        let mut next = self.belief.clone();
-        if dt > 0.0 {
-            let kernel = match self.kernel.take() {
-                Some((seconds, kernel)) if seconds == dt => kernel,
-                _ => self.moved(py, dt)?,
-            };
-            let predicted = py.detach(|| kernel.predict(&self.belief));
-            self.kernel = Some((dt, kernel));
-            next = predicted?;
-        }
-        let mut log_likelihood = 0.0;
-        for (function, observation) in self.likelihoods.of(observation.as_ref())? {
-            let found = function.bind(py).call1((self.nodes(py), observation))?;
-            let found = returned("likelihood", "node", &found, next.density().len())?;
-            let logs: Vec<f64> = found.as_array().iter().copied().collect();
-            let what = "a log likelihood";
-            let largest = largest_number(&logs).ok_or(Error::NotANumber { what })?;
-            if !largest.is_finite() {
-                return Err(Error::unlikely_or_no_number(largest, what).into());
-            }
-            // Relative to the largest, so that no exponential overflows.
-            let weights: Vec<f64> = logs.iter().map(|log| (log - largest).exp()).collect();
-            log_likelihood += largest + next.reweight(&weights)?.ln();
-        }
-        self.belief = next;
-        Ok(log_likelihood)
+        let nodes = self.nodes(py).into_any();
+        let moved = |belief: &PointMass| moved(py, &self.mean, &self.deviation, belief.grid(), dt);
+        let of = (dt, &nodes);
+        step(py, &mut self.belief, &mut self.kernel, &self.likelihoods, observation.as_ref(), of, moved)
     }
 
     /// One step per row of a table, its column `time` in seconds or timestamps; null and NaN are missing. The first row is the time of the
@@ -169,30 +140,27 @@ impl GridFilter {
     }
 }
 
-/// Differences of times to the nanosecond: steps of equal length then share their kernel.
-pub(crate) fn dt_of(second: f64, before: f64) -> f64 {
-    let dt = second - before;
-    let rounded = (dt * 1e9).round() / 1e9;
-    if rounded > 0.0 { rounded } else { dt }
-}
-
-impl GridFilter {
-    /// The kernel over `dt` seconds.
-    fn moved(&self, py: Python<'_>, dt: f64) -> Outcome<TransitionKernel> {
-        let points = self.belief.density().len();
-        let mean = self.mean.bind(py).call1((self.nodes(py), dt))?;
-        let mean = returned("mean", "node", &mean, points)?;
-        let deviation = self.deviation.bind(py).call1((self.nodes(py), dt))?;
-        let deviations: Vec<f64> = match deviation.extract::<f64>() {
-            Ok(one) => vec![one; points],
-            Err(_) => returned("deviation", "node", &deviation, points)?
-                .as_array()
-                .iter()
-                .copied()
-                .collect(),
-        };
-        let moved: Vec<(f64, f64)> = mean.as_array().iter().copied().zip(deviations).collect();
-        let grid = *self.belief.grid();
-        Ok(py.detach(|| TransitionKernel::from_transitions(grid, &moved))?)
-    }
+/// The kernel over `dt` seconds.
+fn moved(
+    py: Python<'_>,
+    mean: &Py<PyAny>,
+    deviation: &Py<PyAny>,
+    grid: &UniformGrid,
+    dt: f64,
+) -> Outcome<TransitionKernel> {
+    let nodes = || PyArray1::from_vec(py, grid.nodes().collect());
+    let points = grid.points();
+    let mean = mean.bind(py).call1((nodes(), dt))?;
+    let mean = returned("mean", "node", &mean, points)?;
+    let deviation = deviation.bind(py).call1((nodes(), dt))?;
+    let deviations: Vec<f64> = match deviation.extract::<f64>() {
+        Ok(one) => vec![one; points],
+        Err(_) => returned("deviation", "node", &deviation, points)?
+            .as_array()
+            .iter()
+            .copied()
+            .collect(),
+    };
+    let moved: Vec<(f64, f64)> = mean.as_array().iter().copied().zip(deviations).collect();
+    Ok(py.detach(|| TransitionKernel::from_transitions(*grid, &moved))?)
 }

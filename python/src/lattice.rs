@@ -1,9 +1,9 @@
 //! The exact filter of several numbers on a lattice, with the user's dynamics and likelihood as functions of all nodes at once.
 
 use crate::array::{matrix, vector};
-use crate::callbacks::{Likelihoods, returned, rising};
+use crate::callbacks::{Likelihoods, rising};
 use crate::error::{Failure, Outcome, refused};
-use crate::grid::dt_of;
+use crate::nodes::{Kept, callable, dt_of, step};
 use crate::table::{Given, Table, doubles};
 use fewbits_filters::{Lattice, LatticeFilter as Kernel, UniformGrid};
 use numpy::{PyArray1, PyArray2};
@@ -31,8 +31,7 @@ pub(crate) struct LatticeFilter {
     deviation: Py<PyAny>,
     likelihoods: Likelihoods,
     belief: Lattice,
-    /// The kernel of the last step, and its seconds.
-    kernel: Option<(f64, Kernel)>,
+    kernel: Kept<Kernel>,
 }
 
 #[pymethods]
@@ -48,11 +47,8 @@ impl LatticeFilter {
         spacing: &Bound<'_, PyAny>,
         start: &Bound<'_, PyAny>,
     ) -> Outcome<Self> {
-        for (name, function) in [("mean", mean), ("deviation", deviation)] {
-            if !function.is_callable() {
-                return refused(name, function.get_type().name()?, "a function of the nodes and seconds");
-            }
-        }
+        callable("mean", mean)?;
+        callable("deviation", deviation)?;
         let (lower, upper) = (vector("lower", lower)?, vector("upper", upper)?);
         let spacing = vector("spacing", spacing)?;
         for (name, ends) in [("upper", &upper), ("spacing", &spacing)] {
@@ -74,7 +70,7 @@ impl LatticeFilter {
         Ok(Self {
             mean: mean.clone().unbind(),
             deviation: deviation.clone().unbind(),
-            likelihoods: Likelihoods::parsed(likelihood)?,
+            likelihoods: Likelihoods::parsed("likelihood", likelihood)?,
             belief,
             kernel: None,
         })
@@ -84,28 +80,10 @@ impl LatticeFilter {
     /// likelihoods by name the observation is a dictionary. A step that fails leaves the density as it was.
     #[pyo3(signature = (observation=None, *, dt=1.0))]
     fn step(&mut self, py: Python<'_>, observation: Option<Bound<'_, PyAny>>, dt: f64) -> Outcome<f64> {
-        if !(dt >= 0.0 && dt.is_finite()) {
-            return refused("dt", dt, "a finite number, 0 or above");
-        }
-        let mut next = self.belief.clone();
-        if dt > 0.0 {
-            let kernel = match self.kernel.take() {
-                Some((seconds, kernel)) if seconds == dt => kernel,
-                _ => self.moved(py, dt)?,
-            };
-            let predicted = py.detach(|| kernel.predict(&self.belief));
-            self.kernel = Some((dt, kernel));
-            next = predicted?;
-        }
-        let mut log_likelihood = 0.0;
-        for (function, observation) in self.likelihoods.of(observation.as_ref())? {
-            let found = function.bind(py).call1((self.nodes(py)?, observation))?;
-            let found = returned("likelihood", "node", &found, next.density().len())?;
-            let logs: Vec<f64> = found.as_array().iter().copied().collect();
-            log_likelihood += next.update(&logs)?;
-        }
-        self.belief = next;
-        Ok(log_likelihood)
+        let nodes = self.nodes(py)?.into_any();
+        let moved = |belief: &Lattice| moved(py, &self.mean, &self.deviation, belief, dt);
+        let of = (dt, &nodes);
+        step(py, &mut self.belief, &mut self.kernel, &self.likelihoods, observation.as_ref(), of, moved)
     }
 
     /// One step per row of a table, its column `time` in seconds or timestamps; null and NaN are missing. The first row is the time of the
@@ -138,10 +116,7 @@ impl LatticeFilter {
     /// The nodes, a coordinate in each row.
     #[getter]
     fn nodes<'py>(&self, py: Python<'py>) -> Outcome<Bound<'py, PyArray2<f64>>> {
-        let rows: Vec<Vec<f64>> = (0..self.belief.axes().len())
-            .map(|axis| self.belief.positions(axis))
-            .collect();
-        Ok(PyArray2::from_vec2(py, &rows).map_err(PyErr::from)?)
+        nodes(py, &self.belief)
     }
 
     /// The density at the nodes, an axis for each coordinate: its sum times the product of the spacings is one.
@@ -185,29 +160,33 @@ impl LatticeFilter {
     }
 }
 
-impl LatticeFilter {
-    /// The kernel over `dt` seconds.
-    fn moved(&self, py: Python<'_>, dt: f64) -> Outcome<Kernel> {
-        let (d, n) = (self.belief.axes().len(), self.belief.density().len());
-        let by_rows = |name: &'static str, found: &Bound<'_, PyAny>| -> Outcome<Vec<Vec<f64>>> {
-            let (rows, columns, numbers) = matrix(name, found)?;
-            if (rows, columns) != (d, n) {
-                return refused(
-                    name,
-                    format!("an array of shape ({rows}, {columns})"),
-                    format!("({d}, {n}), as the nodes"),
-                );
-            }
-            Ok(numbers.chunks_exact(n).map(<[f64]>::to_vec).collect())
-        };
-        let means = by_rows("mean", &self.mean.bind(py).call1((self.nodes(py)?, dt))?)?;
-        let found = self.deviation.bind(py).call1((self.nodes(py)?, dt))?;
-        let deviations = match vector("deviation", &found) {
-            Ok(one) if one.len() == 1 => vec![vec![one[0]; n]; d],
-            Ok(each) if each.len() == d => each.into_iter().map(|one| vec![one; n]).collect(),
-            _ => by_rows("deviation", &found)?,
-        };
-        py.detach(|| Kernel::new(means, deviations, &self.belief))
-            .map_err(Failure::from)
-    }
+/// The nodes of a lattice, a coordinate in each row.
+fn nodes<'py>(py: Python<'py>, belief: &Lattice) -> Outcome<Bound<'py, PyArray2<f64>>> {
+    let rows: Vec<Vec<f64>> = (0..belief.axes().len()).map(|axis| belief.positions(axis)).collect();
+    Ok(PyArray2::from_vec2(py, &rows).map_err(PyErr::from)?)
+}
+
+/// The kernel over `dt` seconds.
+fn moved(py: Python<'_>, mean: &Py<PyAny>, deviation: &Py<PyAny>, belief: &Lattice, dt: f64) -> Outcome<Kernel> {
+    let (d, n) = (belief.axes().len(), belief.density().len());
+    let by_rows = |name: &'static str, found: &Bound<'_, PyAny>| -> Outcome<Vec<Vec<f64>>> {
+        let (rows, columns, numbers) = matrix(name, found)?;
+        if (rows, columns) != (d, n) {
+            return refused(
+                name,
+                format!("an array of shape ({rows}, {columns})"),
+                format!("({d}, {n}), as the nodes"),
+            );
+        }
+        Ok(numbers.chunks_exact(n).map(<[f64]>::to_vec).collect())
+    };
+    let means = by_rows("mean", &mean.bind(py).call1((nodes(py, belief)?, dt))?)?;
+    let found = deviation.bind(py).call1((nodes(py, belief)?, dt))?;
+    let deviations = match vector("deviation", &found) {
+        Ok(one) if one.len() == 1 => vec![vec![one[0]; n]; d],
+        Ok(each) if each.len() == d => each.into_iter().map(|one| vec![one; n]).collect(),
+        _ => by_rows("deviation", &found)?,
+    };
+    py.detach(|| Kernel::new(means, deviations, belief))
+        .map_err(Failure::from)
 }

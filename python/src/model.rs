@@ -23,7 +23,7 @@ macro_rules! with_dimension {
                 const $D: usize = $d;
                 $body
             })*
-            other => refused("dimension", other, "1 to 6 coordinates"),
+            other => $crate::error::refused("dimension", other, "1 to 6 coordinates"),
         }
     };
 }
@@ -100,7 +100,7 @@ impl<const D: usize> Evolution<D> for Moves<D> {
 }
 
 impl Model {
-    fn of<const D: usize>(model: ContinuousLinear<D>) -> Self {
+    pub(crate) fn of<const D: usize>(model: ContinuousLinear<D>) -> Self {
         Self {
             dimension: D,
             drift: model.drift().as_slice().to_vec(),
@@ -238,6 +238,40 @@ impl Model {
         model.checked()
     }
 
+    /// This model and another side by side, independent of each other: the coordinates of this one, then those of the other.
+    ///
+    /// >>> import fewbits as fb
+    /// >>> fb.Model.velocity(0.1).beside(fb.Model.walk(0.01)).dimension
+    /// 3
+    fn beside(&self, other: &Bound<'_, Self>) -> Outcome<Self> {
+        let other = other.get();
+        if self.interval != other.interval {
+            let shown = |model: &Self| match model.interval {
+                None => "in continuous time".to_owned(),
+                Some(interval) => format!("in steps of {interval} s"),
+            };
+            return refused("other", shown(other), shown(self));
+        }
+        let (a, b) = (self.dimension, other.dimension);
+        let d = a + b;
+        let both = |first: &[f64], second: &[f64]| -> Vec<f64> {
+            let entry = |k: usize| match (k % d, k / d) {
+                (i, j) if i < a && j < a => first[j * a + i],
+                (i, j) if i >= a && j >= a => second[(j - a) * b + i - a],
+                _ => 0.0,
+            };
+            (0..d * d).map(entry).collect()
+        };
+        let model = Self {
+            dimension: d,
+            drift: both(&self.drift, &other.drift),
+            offset: [self.offset.as_slice(), &other.offset].concat(),
+            density: both(&self.density, &other.density),
+            interval: self.interval,
+        };
+        model.checked()
+    }
+
     /// Number of coordinates.
     ///
     /// >>> import fewbits as fb
@@ -302,4 +336,27 @@ pub(crate) fn sized(name: &'static str, given: Vec<f64>, dimension: usize) -> Ou
         return Ok(given);
     }
     refused(name, format!("{} numbers", given.len()), format!("{dimension}"))
+}
+
+/// The covariance, by columns, of deviations or of a matrix.
+pub(crate) fn covariance(
+    deviation: Option<&Bound<'_, PyAny>>,
+    covariance: Option<&Bound<'_, PyAny>>,
+    dimension: usize,
+) -> Outcome<Vec<f64>> {
+    match (deviation, covariance) {
+        (Some(deviation), None) => {
+            let deviation = sized("deviation", vector("deviation", deviation)?, dimension)?;
+            if let Some(bad) = deviation.iter().find(|x| x.is_nan() || **x < 0.0) {
+                return refused("deviation", bad, "numbers, 0 or above");
+            }
+            let entry = |k: usize| match (k % dimension, k / dimension) {
+                (i, j) if i == j => deviation[i] * deviation[i],
+                _ => 0.0,
+            };
+            Ok((0..dimension * dimension).map(entry).collect())
+        }
+        (None, Some(covariance)) => square("covariance", covariance, dimension),
+        _ => refused("deviation", "given with a covariance, or neither is", "one of the two"),
+    }
 }

@@ -1,9 +1,8 @@
 //! A fusion centre as plain data.
 
 use crate::error::{Outcome, refused};
-use crate::model::{Model, with_dimension};
+use crate::model::Model;
 use crate::seat::Seat;
-use crate::step::Built;
 use crate::table::Origin;
 use fewbits_filters::centre::Health;
 use serde::{Deserialize, Serialize};
@@ -50,17 +49,4 @@ pub(crate) struct Parts {
     pub(crate) origin: Option<Origin>,
     /// The stored state of the library's centre.
     pub(crate) state: Option<Vec<u8>>,
-}
-
-impl Parts {
-    /// Refuses what the library's centre would refuse.
-    pub(crate) fn checked(self) -> Outcome<Self> {
-        if let Some(Origin::Seconds(first)) = self.origin
-            && !first.is_finite()
-        {
-            return refused("time", first, "a finite number");
-        }
-        with_dimension!(self.model.coordinates(), D => Built::<D>::new(&self).map(|_| ()))?;
-        Ok(self)
-    }
 }

@@ -81,14 +81,23 @@ impl<const D: usize> Built<D> {
     }
 
     pub(crate) fn join(&mut self, seat: &Seat) -> Outcome<()> {
-        self.centre.join_boxed(self.seats.len() as u32, seat.remote::<D>()?)?;
-        self.nodes.push(seat.node::<D>()?);
+        let (remote, node) = (seat.remote::<D>()?, seat.node::<D>()?);
+        self.centre.join_boxed(self.seats.len() as u32, remote)?;
+        self.nodes.push(node);
         self.seats.push(seat.clone());
         Ok(())
     }
 
     pub(crate) fn stored(&self) -> Outcome<Vec<u8>> {
         Ok(self.centre.state().to_bytes()?)
+    }
+
+    pub(crate) fn state(&self) -> CentreState<Gaussian<D>> {
+        self.centre.state()
+    }
+
+    pub(crate) fn restore(&mut self, state: CentreState<Gaussian<D>>) -> Outcome<()> {
+        Ok(self.centre.restore(state)?)
     }
 
     pub(crate) fn belief(&self) -> Gaussian<D> {
@@ -176,23 +185,8 @@ impl<const D: usize> Built<D> {
     }
 
     fn named(&self, event: &Event) -> String {
-        let of = |number: &u32, what: &str| match self.seats.get(*number as usize) {
-            Some(seat) => format!("{} {what}", seat.name),
-            None => what.to_owned(),
-        };
-        match event {
-            Event::Dead(number) => of(number, "dead"),
-            Event::Alive(number) => of(number, "alive"),
-            Event::Excluded(number) => of(number, "excluded"),
-            Event::Readmitted(number) => of(number, "readmitted"),
-            Event::Rejected(number) => of(number, "rejected"),
-            Event::Disputed(number) => of(number, "disputed"),
-            Event::Copied(number) => of(number, "copied"),
-            Event::Lost => "lost".to_owned(),
-            Event::NoiseOverstated => "noise overstated".to_owned(),
-            Event::Reopened => "reopened".to_owned(),
-            _ => "reacquired".to_owned(),
-        }
+        let seat = event.sensor().and_then(|number| self.seats.get(number as usize));
+        seat.map_or(event.name().to_owned(), |seat| format!("{} {}", seat.name, event.name()))
     }
 
     /// What smoothing needs of the present belief.

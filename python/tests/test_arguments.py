@@ -51,6 +51,11 @@ def lattice():
     )
 
 
+def sigma(**given):
+    made = {"process": np.eye(2), "noise": 1.0, "mean": [0.0, 0.0], "deviation": [1.0, 1.0], **given}
+    return fb.SigmaPointFilter(lambda x, dt: None, lambda x: x[0], **made)
+
+
 def search():
     return fb.SourceSearch(
         [[0.0, 0.0], [5.0, 0.0]], reach=9.0, instants=[5.0], noise=1e-5, diffusivity=40.0, rate=1.0, box=((-9, -9), (9, 9))
@@ -104,6 +109,20 @@ CALLS = {
     "LatticeFilter.marginal": (lambda *a: lattice().marginal(*a), ["coordinate"], []),
     "GridFilter.step": (lambda *a, **k: grid().step(*a, **k), ["observation"], ["dt"]),
     "GridFilter.run": (lambda *a, **k: grid().run(*a, **{"time": "t", **k}), ["table"], ["time"]),
+    "SigmaPointFilter": (
+        lambda *a, **k: fb.SigmaPointFilter(*a, **{"process": np.eye(2), "noise": 1.0, "mean": [0.0, 0.0], "deviation": [1.0, 1.0], **k}),
+        ["move", "measure"],
+        ["process", "noise", "mean", "deviation", "covariance", "rule", "kappa", "send"],
+    ),
+    "SigmaPointFilter's settings": (sigma, [], ["process", "noise", "mean", "deviation", "covariance", "rule", "kappa", "send"]),
+    "SigmaPointFilter.step": (lambda *a, **k: sigma().step(*a, **k), ["observation"], ["dt"]),
+    "SigmaPointFilter.run": (lambda *a, **k: sigma().run(*a, **{"time": "t", **k}), ["table"], ["time"]),
+    "fit": (
+        lambda *a, **k: fb.fit(*a, **{"time": "t", **k}),
+        ["table"],
+        ["time", "by", "value", "sensors", "reference", "find", "bits", "noise"],
+    ),
+    "Model.beside": (fb.Model.walk(0.1).beside, ["other"], []),
     "RangeTracker": (fb.RangeTracker, ["anchors"], ["send", "noise", "outliers", "silence"]),
     "RangeTracker.run": (fb.RangeTracker(ANCHORS).run, ["table", "time", "by", "value"], []),
     "SourceSearch": (
@@ -122,7 +141,7 @@ CALLS = {
     "design": (
         lambda **k: fb.design(**{"prior": (0.0, 1.0), "noise": [1.0], "bits": [1], "seconds": 0.01, **k}),
         [],
-        ["prior", "noise", "bits", "loss", "flips", "criterion"],
+        ["prior", "noise", "bits", "support", "loss", "flips", "criterion"],
     ),
 }
 ACCEPTED = (fb.Error, TypeError, ValueError, KeyError, OverflowError, IndexError, AttributeError, OSError)

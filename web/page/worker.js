@@ -1,12 +1,15 @@
 // Calls the module: one message a question, one message an answer with the same number.
 let ready, opened, recording;
 const answers = {
-  open({ bytes, said }) {
+  async open({ bytes, said }) {
     recording = undefined;
     opened?.free();
     opened = undefined;
-    opened = wasm_bindgen.Opened.read(bytes, said);
-    return JSON.parse(opened.summary());
+    const isParquet = typeof parquet !== "undefined" && [...bytes.subarray(0, 4)].join() === "80,65,82,49";
+    const rows = isParquet ? await ofParquet(bytes) : bytes;
+    opened = wasm_bindgen.Opened.read(rows, said);
+    const found = JSON.parse(opened.summary());
+    return isParquet ? { ...found, format: "Parquet", dialect: "", options: "" } : found;
   },
   pack({ bound, effort, identity = crypto.getRandomValues(new Uint32Array(1))[0] }) {
     const began = performance.now();
@@ -28,6 +31,13 @@ const answers = {
   },
   design(setting) { return JSON.parse(wasm_bindgen.design(JSON.stringify(setting))); },
 };
+async function ofParquet(bytes) {
+  try {
+    return await parquet.toCsv(bytes, wasm_bindgen.gunzip);
+  } catch (problem) {
+    throw `the Parquet file is damaged or of a kind that cannot be read: ${problem.message ?? problem}`;
+  }
+}
 async function compiled(packed) {
   const module = new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip")));
   return wasm_bindgen({ module_or_path: await module.arrayBuffer() });
@@ -39,7 +49,7 @@ onmessage = async ({ data: { id, question, given, module } }) => {
   }
   try {
     await ready; // a message may come before the module is compiled
-    postMessage({ id, answer: answers[question](given) });
+    postMessage({ id, answer: await answers[question](given) });
   } catch (problem) {
     postMessage({ id, problem: typeof problem === "string" ? problem : `the page failed (${problem}): please report the table with which it did` });
   }

@@ -14,6 +14,19 @@ pub use design::design;
 pub use one_bit::{Run, one_bit};
 pub use table::{Effort, Opened};
 
+use std::io::Read;
+use wasm_bindgen::prelude::wasm_bindgen;
+
+/// Unpacks gzip, for columns of Parquet files.
+#[wasm_bindgen]
+pub fn gunzip(packed: &[u8]) -> Result<Vec<u8>, String> {
+    let mut all = Vec::new();
+    match flate2::read::MultiGzDecoder::new(packed).read_to_end(&mut all) {
+        Ok(_) => Ok(all),
+        Err(error) => Err(text(error)),
+    }
+}
+
 /// An error with its causes, as a sentence.
 fn text(error: impl std::error::Error) -> String {
     let mut text = error.to_string();

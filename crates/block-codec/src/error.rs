@@ -84,6 +84,16 @@ pub enum Error {
     Damaged(#[from] Damaged),
 }
 
+impl Error {
+    /// The refused argument, if that is the error.
+    pub fn argument(&self) -> Option<&ArgumentError> {
+        match self {
+            Self::Argument(argument) => Some(argument),
+            _ => None,
+        }
+    }
+}
+
 impl From<crate::bytes::Unread> for Damaged {
     fn from(error: crate::bytes::Unread) -> Self {
         Self::new("bytes", error, "the bytes that a writer writes")

@@ -37,6 +37,7 @@ mod decode;
 mod encode;
 mod error;
 mod experts;
+pub mod frame;
 mod grid;
 mod head;
 mod indices;
@@ -81,17 +82,20 @@ pub struct BlockCodec {
 }
 
 impl BlockCodec {
-    /// A codec that returns every finite sample within `delta`, in the units of the samples.
+    /// A codec that returns every finite sample within `bound`, in the units of the samples.
     ///
     /// # Errors
-    /// If `delta` is not above 0 or `2 delta` not finite.
-    pub fn new(delta: f64) -> Result<Self, Error> {
-        ArgumentError::positive("delta", delta)?;
-        if !(2.0 * delta).is_finite() {
-            return Err(ArgumentError::new("delta", delta, "a number whose double is finite").into());
+    /// If `bound` is not above 0 or `2 bound` not finite.
+    pub fn new(bound: f64) -> Result<Self, Error> {
+        ArgumentError::positive("bound", bound)?;
+        if !(2.0 * bound).is_finite() {
+            return Err(ArgumentError::new("bound", bound, "a number whose double is finite").into());
         }
         Ok(Self {
-            accuracy: Accuracy::Within { delta, period: None },
+            accuracy: Accuracy::Within {
+                delta: bound,
+                period: None,
+            },
             effort: Effort::default(),
         })
     }
@@ -100,14 +104,14 @@ impl BlockCodec {
     /// bound holds around the circle. No effect on a lossless codec.
     ///
     /// # Errors
-    /// If `period` is not positive and finite, or above `2^40 delta`.
+    /// If `period` is not positive and finite, or above `2^40` times the bound.
     pub fn on_circle(self, period: f64) -> Result<Self, Error> {
         ArgumentError::positive("period", period)?;
         let Accuracy::Within { delta, .. } = self.accuracy else {
             return Ok(self);
         };
         if period / delta > MOST_CELLS {
-            return Err(ArgumentError::new("period", period, "at most 2^40 times `delta`").into());
+            return Err(ArgumentError::new("period", period, "at most 2^40 times the bound").into());
         }
         let period = Some(period);
         Ok(Self {

@@ -58,6 +58,14 @@ pub enum Error {
 }
 
 impl Error {
+    /// The refused argument, if that is the error.
+    pub fn argument(&self) -> Option<&ArgumentError> {
+        match self {
+            Self::Argument(argument) => Some(argument),
+            _ => None,
+        }
+    }
+
     /// The error for an update whose result is not finite: `Impossible` if `log_evidence` is `-inf`, otherwise `NotANumber` with `what`.
     pub fn unlikely_or_no_number(log_evidence: f64, what: &'static str) -> Self {
         if log_evidence == f64::NEG_INFINITY {

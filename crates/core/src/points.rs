@@ -118,22 +118,39 @@ pub fn move_points<const D: usize, const M: usize>(
     observed
         .sensing
         .mean_columns(&shared, measured.each_mut().map(Vec::as_mut_slice));
-    let measured: Columns<'_, M> = measured.each_ref().map(Vec::as_slice);
-    let prior = moments(&measured, weights);
+    move_measured_points(states, weights, &measured.each_ref().map(Vec::as_slice), &observed.factor)
+}
+
+/// As [`move_points`], with the noise-free measurements of the points, which the caller has computed.
+///
+/// # Errors
+/// As [`move_points`], or if there is not one measurement per point.
+pub fn move_measured_points<const D: usize, const M: usize>(
+    mut states: ColumnsMut<'_, D>,
+    weights: &[f64],
+    measured: &Columns<'_, M>,
+    factor: &impl Factor<M>,
+) -> Result<(f64, SVector<f64, M>), Error> {
+    check(&mut states, weights)?;
+    if let Some(other) = measured.iter().find(|column| column.len() != weights.len()) {
+        return refuse("measured", format!("{} numbers", other.len()), "one per point");
+    }
+    let shared: Columns<'_, D> = states.each_ref().map(|column| &**column);
+    let prior = moments(measured, weights);
     let state = moments(&shared, weights);
     if !(prior.is_finite() && state.is_finite()) {
         let what = "the predicted measurement (from the belief or the sensing model)";
         return Err(Error::NotANumber { what });
     }
-    let tilted = observed.factor.tilted(&prior)?;
-    let together = cross(&shared, state.mean(), &measured, prior.mean(), weights);
+    let tilted = factor.tilted(&prior)?;
+    let together = cross(&shared, state.mean(), measured, prior.mean(), weights);
     let gain = solve_semidefinite(prior.covariance(), &together.transpose())?.transpose();
     let map = between(prior.covariance(), &tilted.covariance);
     if !tilted.log_evidence.is_finite() {
         return Err(Error::unlikely_or_no_number(tilted.log_evidence, "the evidence"));
     }
     move_all(&mut states, |i, x| {
-        let y = state_at(&measured, i);
+        let y = state_at(measured, i);
         x + gain * (tilted.mean + map * (y - prior.mean()) - y)
     })?;
     Ok((tilted.log_evidence, tilted.mean - prior.mean()))

@@ -2,7 +2,7 @@
 
 use crate::contract::{Info, StateFilter};
 use crate::{Error, ResamplingRule};
-use fewbits_core::{Columns, Dynamics, Gaussian, GaussianDynamics, Likelihood};
+use fewbits_core::{Columns, ColumnsMut, Dynamics, Gaussian, GaussianDynamics, Likelihood};
 use fewbits_densities::Particles;
 use fewbits_numerics::error::at_least_one;
 use rand::Rng;
@@ -67,6 +67,34 @@ impl<const D: usize> BootstrapFilter<D> {
         self.resample(rng, belief)?;
         dynamics.propagate_columns(rng, belief.columns_mut());
         Ok(())
+    }
+
+    /// One step in place by functions of all particles at once, which may fail: `change` draws the next states, `weigh` adds the log
+    /// likelihoods of what was observed to the log weights. The model need not be Gaussian or differentiable, and needs no type.
+    ///
+    /// # Errors
+    /// Those of the two functions, of [`ResamplingRule::resample`] and of [`update`](StateFilter::update). The belief is then as it was.
+    pub fn step_by<E: From<Error>>(
+        &mut self,
+        rng: &mut dyn Rng,
+        belief: &mut Particles<D>,
+        change: impl FnOnce(&mut dyn Rng, ColumnsMut<'_, D>) -> Result<(), E>,
+        weigh: impl FnOnce(Columns<'_, D>, &mut [f64]) -> Result<(), E>,
+    ) -> Result<Info, E> {
+        let next = self.next.get_or_insert_with(|| belief.clone());
+        if self.rule.draw_ancestors(rng, belief, &mut self.ancestors) {
+            next.select_from(belief, &self.ancestors)?;
+        } else {
+            next.clone_from(belief);
+        }
+        change(rng, next.columns_mut())?;
+        let mut weighed = Ok(());
+        let info = self::weigh(next, |states, logs| weighed = weigh(states, logs));
+        // An error of the caller's comes before those of the weights that it left behind.
+        weighed?;
+        let info = info?;
+        std::mem::swap(belief, next);
+        Ok(info)
     }
 
     /// One step in place: [`predict`](Self::predict), then [`update`](StateFilter::update).

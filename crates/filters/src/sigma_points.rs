@@ -4,7 +4,7 @@ use crate::Error;
 use crate::contract::{Info, StateFilter};
 use crate::root_gaussian::RootGaussian;
 use fewbits_core::columns::state_at;
-use fewbits_core::{Gaussian, GaussianDynamics, Likelihood};
+use fewbits_core::{Columns, ColumnsMut, Factor, Gaussian, GaussianDynamics, Likelihood, points};
 use fewbits_numerics::error::{at_least_one, non_negative};
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
@@ -63,6 +63,51 @@ impl<const D: usize> SigmaPointFilter<D> {
             points: std::array::from_fn(|_| vec![0.0; weights.len()]),
             weights,
         })
+    }
+
+    /// Time update by a model that is evaluated at all points at once and may fail: `change` replaces the points by the means of the next
+    /// states, and `noise` is the covariance of the process noise. The belief is unchanged if it fails.
+    ///
+    /// # Errors
+    /// Those of `change`; [`Error::NotANumber`] if a mean is not finite, or if `noise` is not positive semidefinite.
+    pub fn predict_by<E: From<Error>>(
+        &mut self,
+        belief: &mut RootGaussian<D>,
+        noise: &SMatrix<f64, D, D>,
+        change: impl FnOnce(ColumnsMut<'_, D>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        self.place(belief);
+        change(self.points.each_mut().map(Vec::as_mut_slice))?;
+        *belief = self.belief(noise)?;
+        Ok(())
+    }
+
+    /// Measurement update by a sensing model that is evaluated at all points at once and may fail: `measure` writes the noise-free
+    /// measurements of the points, and `factor` makes from their mean and covariance what was observed. The belief is unchanged if it
+    /// fails.
+    ///
+    /// # Errors
+    /// Those of `measure` and `factor`, and of [`points::move_measured_points`].
+    pub fn update_by<const M: usize, F: Factor<M>, E: From<Error>>(
+        &mut self,
+        belief: &mut RootGaussian<D>,
+        measure: impl FnOnce(&Columns<'_, D>, ColumnsMut<'_, M>) -> Result<(), E>,
+        factor: impl FnOnce(&Gaussian<M>) -> Result<F, E>,
+    ) -> Result<Info, E> {
+        self.place(belief);
+        let mut measured: [Vec<f64>; M] = std::array::from_fn(|_| vec![0.0; self.weights.len()]);
+        measure(&self.points.each_ref().map(Vec::as_slice), measured.each_mut().map(Vec::as_mut_slice))?;
+        let measured = measured.each_ref().map(Vec::as_slice);
+        let predicted = points::moments(&measured, &self.weights);
+        if !predicted.is_finite() {
+            let what = "the predicted measurement (from the sensing model)";
+            return Err(Error::NotANumber { what }.into());
+        }
+        let factor = factor(&predicted)?;
+        let states = self.points.each_mut().map(Vec::as_mut_slice);
+        let (log_likelihood, _) = points::move_measured_points(states, &self.weights, &measured, &factor)?;
+        *belief = self.belief(&SMatrix::zeros())?;
+        Ok(Info::new(log_likelihood))
     }
 
     /// Sets the points to those of `belief`.

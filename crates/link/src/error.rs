@@ -56,6 +56,14 @@ pub enum Error {
 }
 
 impl Error {
+    /// The refused argument, if that is the error.
+    pub fn argument(&self) -> Option<&fewbits_numerics::ArgumentError> {
+        match self {
+            Self::Argument(argument) => Some(argument),
+            _ => None,
+        }
+    }
+
     /// Whether a file could not be read or written, which may pass: a full disk, too many open files.
     pub fn is_of_file(&self) -> bool {
         matches!(self, Self::File { .. })

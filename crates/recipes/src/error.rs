@@ -97,6 +97,16 @@ pub enum Error {
     Stopped,
 }
 
+impl Error {
+    /// The argument that the recorder or the reader refused, if that is the error.
+    pub fn argument(&self) -> Option<&fewbits_record::ArgumentError> {
+        match self {
+            Self::Record(error) | Self::Column { source: error, .. } => error.argument(),
+            _ => None,
+        }
+    }
+}
+
 fn mend(decimal: Option<&str>) -> String {
     decimal.map_or(String::new(), |decimal| format!("; a decimal point is a point: `{decimal}`"))
 }

@@ -120,6 +120,14 @@ impl From<Unread> for Damage {
 }
 
 impl Error {
+    /// The refused argument, if that is the error.
+    pub fn argument(&self) -> Option<&ArgumentError> {
+        match self {
+            Self::Argument(argument) => Some(argument),
+            _ => None,
+        }
+    }
+
     /// Damage of the header.
     pub(crate) fn header(damage: impl Into<Damage>) -> Self {
         Self::Header(damage.into())

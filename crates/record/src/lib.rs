@@ -86,7 +86,7 @@ pub use block::{Block, Cells};
 pub use blocks::{Blocks, Rows};
 pub use bound::{Bound, MAX_DECIMALS, MIN_SHARE, is_within, is_within_on_circle};
 pub use error::{Damage, Error};
-pub use fewbits_block_codec::Effort;
+pub use fewbits_block_codec::{ArgumentError, Effort};
 pub use frames::{FrameReader, FrameWriter, HeaderRepeats, MIN_FRAME_BYTES};
 pub use merged::{Merged, merged};
 pub use playback::{BlockInfo, Playback, Row};

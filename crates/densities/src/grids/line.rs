@@ -151,6 +151,16 @@ impl PointMass {
         absorb(&mut self.density, &logs, self.grid.spacing())
     }
 
+    /// As [`update`](Self::update), with the log likelihoods at the nodes.
+    ///
+    /// # Errors
+    /// As [`PointMass::update`], or if there is not one per node; [`Error::NotANumber`] if one is NaN or infinite where the density is
+    /// positive.
+    pub fn update_at_nodes(&mut self, log_likelihoods: &[f64]) -> Result<f64, Error> {
+        entries("log_likelihoods", log_likelihoods.len(), self.density.len())?;
+        absorb(&mut self.density, log_likelihoods, self.grid.spacing())
+    }
+
     /// As [`update`](Self::update), with the likelihood given at the nodes up to a constant factor, without allocation. Returns
     /// the evidence up to that factor, not its logarithm. Use [`PointMass::update`] if the likelihood may underflow.
     ///

@@ -31,6 +31,16 @@ impl From<f64> for Reading {
 }
 
 impl Reading {
+    /// A bit: whether the measurement is above zero.
+    pub fn bit(above: bool) -> Self {
+        let (lower, upper) = if above {
+            (0.0, f64::INFINITY)
+        } else {
+            (f64::NEG_INFINITY, 0.0)
+        };
+        Self::Within { lower, upper }
+    }
+
     /// The value, if it is one.
     pub fn value(&self) -> Option<f64> {
         match self {

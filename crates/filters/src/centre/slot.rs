@@ -55,6 +55,39 @@ pub enum Event {
     Reacquired,
 }
 
+impl Event {
+    /// The name of this kind of event, in lower case.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Dead(_) => "dead",
+            Self::Alive(_) => "alive",
+            Self::Excluded(_) => "excluded",
+            Self::Readmitted(_) => "readmitted",
+            Self::Lost => "lost",
+            Self::NoiseOverstated => "noise overstated",
+            Self::Rejected(_) => "rejected",
+            Self::Disputed(_) => "disputed",
+            Self::Copied(_) => "copied",
+            Self::Reopened => "reopened",
+            Self::Reacquired => "reacquired",
+        }
+    }
+
+    /// The number of the sensor that it is about; `None` if it is about the whole centre.
+    pub fn sensor(&self) -> Option<u32> {
+        match self {
+            Self::Dead(sensor)
+            | Self::Alive(sensor)
+            | Self::Excluded(sensor)
+            | Self::Readmitted(sensor)
+            | Self::Rejected(sensor)
+            | Self::Disputed(sensor)
+            | Self::Copied(sensor) => Some(*sensor),
+            Self::Lost | Self::NoiseOverstated | Self::Reopened | Self::Reacquired => None,
+        }
+    }
+}
+
 /// Results of an update other than the belief.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]

@@ -26,6 +26,8 @@ use fewbits_numerics::error::{positive, refuse};
 use model::Scale;
 use problem::Problem;
 use serde::{Deserialize, Serialize};
+use std::cell::Cell;
+use std::ops::ControlFlow;
 
 /// Readings of a sensor from which anything is found, at least.
 const FEWEST: usize = 12;
@@ -75,6 +77,28 @@ pub struct Fit {
 /// If instants are out of order, name a sensor outside `0..sensors`, or have a reading that is not finite; if a known noise is not positive or
 /// the reference no sensor; if there are fewer than 12 readings, or only bits: they leave unit and zero of the level unknown.
 pub fn fit(instants: &[Instant], sensors: usize, request: &Request) -> Result<Fit, Error> {
+    fitted(instants, sensors, request, &|| true)
+}
+
+/// As [`fit`], and `watch` is asked before every evaluation of the likelihood whether to go on. `None` if it broke.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_watched(
+    instants: &[Instant],
+    sensors: usize,
+    request: &Request,
+    watch: &dyn Fn() -> ControlFlow<()>,
+) -> Result<Option<Fit>, Error> {
+    let goes_on = Cell::new(true);
+    let found = fitted(instants, sensors, request, &|| {
+        goes_on.set(goes_on.get() && watch().is_continue());
+        goes_on.get()
+    });
+    if goes_on.get() { found.map(Some) } else { Ok(None) }
+}
+
+fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn Fn() -> bool) -> Result<Fit, Error> {
     let scale = Scale::of(instants, sensors)?;
     let series: Vec<Vec<(f64, f64)>> = (0..sensors).map(|sensor| values_of(instants, sensor)).collect();
     let (relative_to, mut refused) = anchor(&series, instants, request)?;
@@ -117,7 +141,7 @@ pub fn fit(instants: &[Instant], sensors: usize, request: &Request) -> Result<Fi
             }
         }
     }
-    let mut problem = Problem::new(instants, scale, start, free);
+    let mut problem = Problem::new(instants, scale, start, free).asking(goes_on);
     problem.solve();
     if request.time_constant {
         problem.try_time_constant(&mut refused);

@@ -101,6 +101,32 @@ impl LevelModel {
         self.sensors.iter().try_for_each(SensorModel::check)
     }
 
+    /// Mean and standard deviation of the level at the first instant, before any reading. A level that returns has its stationary
+    /// distribution, one that wanders a wide one about the middle of the values.
+    ///
+    /// # Errors
+    /// As [`log_likelihood`](Self::log_likelihood).
+    pub fn first_level(&self, instants: &[Instant]) -> Result<(f64, f64), Error> {
+        self.check()?;
+        let scale = Scale::of(instants, self.sensors.len())?;
+        let (mean, variance) = self.first(&scale);
+        Ok((mean, variance.sqrt()))
+    }
+
+    /// Mean and variance of the level at first.
+    fn first(&self, scale: &Scale) -> (f64, f64) {
+        match self.settled() {
+            Some(variance) => (self.mean, variance),
+            None => (scale.middle, (FIRST * scale.spread).powi(2)),
+        }
+    }
+
+    /// Variance in the long run of a level that returns.
+    fn settled(&self) -> Option<f64> {
+        self.time_constant
+            .map(|seconds| 0.5 * (self.change * self.change) * seconds)
+    }
+
     /// `ln p` of all readings, with their standardised innovations by sensor.
     ///
     /// # Errors
@@ -146,11 +172,8 @@ impl LevelModel {
         let n = 1 + walks.len();
         let (mut mean, mut covariance, mut cross) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; n]);
         let rate = self.change * self.change;
-        let settled = self.time_constant.map(|seconds| 0.5 * rate * seconds);
-        (mean[0], covariance[0]) = match settled {
-            Some(variance) => (self.mean, variance),
-            None => (scale.middle, (FIRST * scale.spread).powi(2)),
-        };
+        let settled = self.settled();
+        (mean[0], covariance[0]) = self.first(scale);
         let (mut total, mut now) = (0.0, told.first()?.level);
         for one in &told {
             let seconds = one.level - now;

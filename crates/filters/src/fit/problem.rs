@@ -23,6 +23,8 @@ pub(super) struct Problem<'a> {
     /// Seconds of all readings, and between two.
     length: f64,
     interval: f64,
+    /// Whether the search goes on; otherwise no point is better than another.
+    goes_on: &'a dyn Fn() -> bool,
 }
 
 impl<'a> Problem<'a> {
@@ -40,7 +42,13 @@ impl<'a> Problem<'a> {
             free,
             length: if length > 0.0 { length } else { 1.0 },
             interval: if interval > 0.0 { interval } else { 1.0 },
+            goes_on: &|| true,
         }
+    }
+
+    /// The same search, which asks before every evaluation whether to go on.
+    pub(super) fn asking(self, goes_on: &'a dyn Fn() -> bool) -> Self {
+        Self { goes_on, ..self }
     }
 
     /// The unit of a parameter that may have either sign.
@@ -85,7 +93,7 @@ impl<'a> Problem<'a> {
     }
 
     fn log_likelihood(&self, model: &LevelModel) -> f64 {
-        let found = if model.check().is_ok() {
+        let found = if (self.goes_on)() && model.check().is_ok() {
             model.run(self.instants, &self.scale, |_, _| {})
         } else {
             None

@@ -9,6 +9,7 @@ mod centre;
 mod contract;
 mod failure;
 mod fit;
+mod hooks;
 mod imm;
 mod lattice;
 mod own_law;

@@ -1,7 +1,9 @@
 //! The laws of `core`, run on every dynamics and every sensing of this crate.
 
 use fewbits_core::{Dynamics, GaussianDynamics, LinearDynamics, ScaledNoise, Sensing, laws};
-use fewbits_models::{Ar1, LinearGaussian, LinearSensor, ReceivedPower, constant_velocity_1d, constant_velocity_2d};
+use fewbits_models::{
+    Ar1, ContinuousLinear, LinearGaussian, LinearSensor, ReceivedPower, constant_velocity_1d, constant_velocity_2d,
+};
 use nalgebra::{Matrix2, Matrix2x4, SVector, Vector2, Vector4};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
@@ -36,6 +38,33 @@ fn dynamics() {
         linear(&coloured, &[Vector2::new(4.0, -1.0) * scale]);
     }
     linear(&LinearGaussian::from(Ar1::new(0.8, 0.5).unwrap()), &[[3.0].into()]);
+}
+
+/// Each part moves as it does alone, and neither knows of the other.
+#[test]
+fn models_side_by_side_move_as_alone() {
+    let (place, level) = (
+        ContinuousLinear::nearly_constant_velocity(0.3).unwrap(),
+        ContinuousLinear::ornstein_uhlenbeck(20.0, 60.0, 4.0).unwrap(),
+    );
+    let both = ContinuousLinear::<3>::beside(&place, &level)
+        .unwrap()
+        .over(2.5)
+        .unwrap();
+    let (place, level) = (place.over(2.5).unwrap(), level.over(2.5).unwrap());
+    for (found, first, second) in [
+        (both.transition(), place.transition(), level.transition()),
+        (both.noise_covariance(), place.noise_covariance(), level.noise_covariance()),
+    ] {
+        assert!((found.fixed_view::<2, 2>(0, 0) - first).amax() < 1e-14);
+        assert!((found[(2, 2)] - second[(0, 0)]).abs() < 1e-14);
+        assert!(found.fixed_view::<2, 1>(0, 2).amax() == 0.0 && found.fixed_view::<1, 2>(2, 0).amax() == 0.0);
+    }
+    assert!((both.offset()[2] - level.offset()[0]).abs() < 1e-12 && both.offset()[0] == 0.0);
+    let line = ContinuousLinear::nearly_constant_velocity(0.3).unwrap();
+    assert!(ContinuousLinear::<4>::beside(&line, &line).is_ok());
+    let refused = ContinuousLinear::<3>::beside(&line, &line).unwrap_err();
+    assert_eq!(refused.argument().unwrap().name, "dimension");
 }
 
 #[test]

@@ -175,6 +175,18 @@ impl Solution {
             .collect()
     }
 
+    /// The words of each sensor for many samples: a column per sensor, in the order of [`Solution::sensors`].
+    ///
+    /// # Errors
+    /// If there is not one column per sensor, or a sample is NaN.
+    pub fn encode_columns(&self, samples: &[&[f64]]) -> Result<Vec<Vec<usize>>, Error> {
+        entries("samples", samples.len(), self.sensors.len())?;
+        let columns = self.sensors.iter().zip(samples);
+        columns
+            .map(|(sensor, column)| column.iter().map(|y| sensor.encode(*y)).collect())
+            .collect()
+    }
+
     /// The decoder of least squared error, a table of at most `limit` entries.
     ///
     /// # Errors

@@ -423,3 +423,48 @@ fn minimax_lowers_the_worst_case() {
     assert!(found.bound <= found.worst_case && found.bound > 0.9 * found.worst_case, "{found:?}");
     assert_eq!(found.weights.len(), 9);
 }
+
+/// A prior by a function of all nodes at once is the prior by a function of one, and an error of the caller's comes through.
+#[test]
+fn a_prior_by_a_function_that_may_fail() {
+    #[derive(Debug, PartialEq)]
+    enum Failed {
+        Mine,
+        Library(fewbits_quantizer_design::Error),
+    }
+    impl From<fewbits_quantizer_design::Error> for Failed {
+        fn from(error: fewbits_quantizer_design::Error) -> Self {
+            Self::Library(error)
+        }
+    }
+    let bump = |x: f64| (-0.5 * (x - 1.0) * (x - 1.0)).exp() * (1.0 + 0.3 * x.sin());
+    let one = Prior::density(bump, -5.0..=7.0).unwrap();
+    let all = Prior::density_by(|nodes| Ok::<_, Failed>(nodes.iter().map(|x| bump(*x)).collect()), -5.0..=7.0);
+    assert_eq!(all.unwrap(), one);
+    let rule = |density: fn(&[f64]) -> Result<Vec<f64>, Failed>| Prior::density_by(density, 0.0..=1.0).unwrap_err();
+    assert_eq!(rule(|_| Err(Failed::Mine)), Failed::Mine);
+    for refused in [
+        rule(|nodes| Ok(vec![1.0; nodes.len() - 1])),
+        rule(|nodes| Ok(vec![f64::NAN; nodes.len()])),
+        rule(|nodes| Ok(nodes.iter().map(|x| f64::from(u8::from(*x > 0.37))).collect())),
+    ] {
+        let Failed::Library(error) = refused else {
+            panic!("{refused:?}")
+        };
+        assert!(error.argument().is_some(), "{error}");
+    }
+}
+
+#[test]
+fn columns_are_encoded_as_rows() {
+    let solution = best(unit_pair(0.3), BitBudget::PerSensor(vec![2, 1]), Link::PERFECT);
+    let columns = [[-1.3, 0.2, 2.0], [0.4, -0.9, 0.0]];
+    let words = solution
+        .encode_columns(&columns.each_ref().map(|column| &column[..]))
+        .unwrap();
+    for row in 0..3 {
+        let expected = solution.encode(&[columns[0][row], columns[1][row]]).unwrap();
+        assert_eq!([words[0][row], words[1][row]], expected[..]);
+    }
+    assert!(solution.encode_columns(&[&[0.0]]).is_err());
+}
