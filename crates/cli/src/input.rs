@@ -319,7 +319,12 @@ impl Table {
     pub(crate) fn survey(&mut self, options: &TableOptions) -> Result<Survey, Error> {
         let survey = match self.learned.take() {
             Some(survey) => survey,
-            None => chosen(options)?.survey().map_err(Error::of_table(&self.file))?,
+            None => {
+                let survey = chosen(options)?.survey().map_err(Error::of_table(&self.file))?;
+                // Rows behind the first may show another kind.
+                self.table.use_survey(&survey);
+                survey
+            }
         };
         let survey = self.learned.insert(survey);
         let columns = self.table.selected().iter().map(|i| &survey.columns[*i]);

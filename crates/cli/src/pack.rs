@@ -47,6 +47,11 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
         let problem = "no column of values beside the time: name what separates cells with --delimiter, or the time with --time-column";
         return Err(Error::content(open.file(), problem));
     }
+    // All rows of a file tell what its columns are.
+    let survey: Option<Survey> = match is_regular(&table.file) {
+        true => Some(open.survey(table)?),
+        false => None,
+    };
     check_words(&open)?;
     let mut specs = bounds::parse(&options.bound, &open.names, open.file())?;
     for (i, spec) in specs.iter_mut().enumerate() {
@@ -56,12 +61,6 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
         }
     }
     let needs_range = specs.iter().any(|spec| matches!(spec.bound, Bound::ShareOfRange(_)));
-    let has_time = table.time.is_some() || table.time_column.is_some();
-    let survey: Option<Survey> = if is_regular(&table.file) && (needs_range || has_time) {
-        Some(open.survey(table)?)
-    } else {
-        None
-    };
     let unknown = vec![None; specs.len()];
     let ends = survey.as_ref().map_or(&unknown, |survey| &survey.ends);
     let ends: Vec<_> = ends

@@ -19,7 +19,7 @@ pub fn unit(table: &Table, column: usize) -> String {
     }
 }
 
-/// States the words of the selected columns as the columns of a recording have them, so that cells are the numbers that it has for them.
+/// States the words and the whole numbers of the selected columns as the columns of a recording have them, so that cells are the numbers that it has for them.
 /// `batch`: rows that were read before.
 ///
 /// # Errors
@@ -31,6 +31,9 @@ pub fn use_words(
 ) -> Result<(), fewbits_table::Error> {
     let selected = table.selected().to_vec();
     for (i, (column, recorded)) in selected.into_iter().zip(columns).enumerate() {
+        if recorded.integers().is_some() {
+            table.expect_integers(column);
+        }
         let Some(words) = words::of(recorded.unit()) else {
             continue;
         };
@@ -114,18 +117,19 @@ pub fn cell(
         if let Cells::Integers(cells) = cells {
             return Ok(cells[row].map(|number| integers.code(number)));
         }
-        let number = cells.number(row).ok().flatten();
-        let whole = number.map(|number| (number as i64, number));
-        return match whole {
-            None if cells.number(row).is_ok() => Ok(None),
-            Some((whole, number)) if whole as f64 == number && number.abs() < 9.2e18 => Ok(Some(integers.code(whole))),
-            _ => Err(fewbits_table::Error::Cell {
-                place: batch.places.get(row).copied().unwrap_or_default(),
-                column: table.columns()[table.selected()[index]].name.clone(),
-                cell: number.map_or(String::new(), |number| number.to_string()),
-                problem: "is no whole number of 64 bits, as all others of the recording's column",
-                mend: "mend the cell, or pack the table into a recording of its own".to_owned(),
-            }),
+        let refused = |cell: String| fewbits_table::Error::Cell {
+            place: batch.places.get(row).copied().unwrap_or_default(),
+            column: table.columns()[table.selected()[index]].name.clone(),
+            cell,
+            problem: "is no whole number of 64 bits, as all others of the recording's column",
+            mend: "mend the cell, or pack the table into a recording of its own".to_owned(),
+        };
+        return match cells.number(row).map_err(refused)? {
+            None => Ok(None),
+            Some(number) => integers
+                .code_of(number)
+                .map(Some)
+                .ok_or_else(|| refused(number.to_string())),
         };
     }
     let has_time = !batch.times.is_empty();

@@ -190,12 +190,11 @@ fn codes(name: &str, array: &dyn Array, integers: Integers) -> Result<Cells, Err
             .map(|number| number.map(|number| integers.code(number)))
             .collect());
     }
-    let code = |number: f64| (number.fract() == 0.0 && number.abs() <= MAX_WHOLE as f64).then_some(number as i64);
     let numbers = cells(name, array)?.into_iter();
     let codes: Option<Cells> = numbers
         .map(|number| match number {
             None => Some(None),
-            Some(number) => Some(Some(integers.code(code(number)?))),
+            Some(number) => Some(Some(integers.code_of(number)?)),
         })
         .collect();
     codes.ok_or_else(|| ArgumentError::new("column", format!("`{name}`"), "whole numbers of 64 bits").into())

@@ -6,6 +6,8 @@
 
 /// The largest distance from the origin that is its own code.
 const NEAR: i64 = 1 << 53;
+/// Whole doubles below this are numbers of 64 bits.
+const MOST: f64 = 9_223_372_036_854_775_808.0;
 
 /// How the codes of a column stand for whole numbers.
 ///
@@ -50,6 +52,12 @@ impl Integers {
         // smallest normal double, or not finite, or beyond all near ones.
         let code = f64::from_bits(distance.cast_unsigned());
         near(code).map_or(code, |taken| f64::from_bits(taken.cast_unsigned()))
+    }
+
+    /// The code of a number that a double holds; `None` if it is no whole number of 64 bits.
+    pub fn code_of(self, number: f64) -> Option<f64> {
+        let is_whole = number.fract() == 0.0 && (-MOST..MOST).contains(&number);
+        is_whole.then(|| self.code(number as i64))
     }
 
     /// The number of a code: any double is one.

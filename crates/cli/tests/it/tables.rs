@@ -277,6 +277,18 @@ fn whole_numbers_of_64_bits_come_back() {
     assert!(text(&good(path, &["verify", "t.csv", "t.fewb"], b"")).contains("all promises hold"));
     let info = text(&good(path, &["info", "t.fewb"], b""));
     assert!(info.contains("id: lossless, -9223372036854775808 to 9223372036854775807, 1 gaps"), "{info}");
+    // The first number of more than 53 bits stands behind many others; of a pipe it is then too late.
+    let late: String = (0..3000)
+        .map(|i| format!("{i},{}\n", if i == 2500 { (1_i64 << 60) + 1 } else { i }))
+        .collect();
+    std::fs::write(path.join("late.csv"), format!("time,id\n{late}")).unwrap();
+    for options in [&[] as &[&str], &["--time", "exact"]] {
+        good(path, &[&["pack", "late.csv", "-o", "late.fewb"], options].concat(), b"");
+        assert!(text(&good(path, &["unpack", "late.fewb"], b"")).contains("1152921504606846977\n"));
+        assert!(text(&good(path, &["verify", "late.csv", "late.fewb"], b"")).contains("all promises hold"));
+    }
+    let message = refused(path, &["pack", "-", "-o", "x"], format!("time,id\n{late}").as_bytes());
+    assert!(message.contains("more than 53 bits"), "{message}");
     // Several recordings count from numbers of their own.
     let both = column(&text(&good(path, &["unpack", "u.fewb", "t.fewb"], b"")));
     assert_eq!(both, [ids, ids].concat());

@@ -201,7 +201,12 @@ fn nulls_of_databases_are_gaps_and_signs_of_currencies_are_told() {
 
 #[test]
 fn names_state_the_offset_of_their_times() {
-    for name in ["Date Time - GMT +05:00", "Date Time, GMT+05:00", "time (UTC+5)", "time (UTC +05:00)"] {
+    for name in [
+        "Date Time - GMT +05:00",
+        "Date Time, GMT+05:00",
+        "time (UTC+5)",
+        "time (UTC +05:00)",
+    ] {
         let text = lines(&format!("\"{name}\",x"), |i| format!("2018-05-03 08:{i:02}:23,1"));
         assert_eq!(read(open(&text)).0[0], "2018-05-03T03:00:23Z", "{name}");
     }
