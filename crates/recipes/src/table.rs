@@ -9,6 +9,9 @@ use fewbits_table::{Cells, Kind, Scale, Table, Time, names};
 /// Number of rows per batch.
 const ROWS: usize = 512;
 
+/// Distance of the origins that are chosen by a first row.
+const COARSE: i64 = 1 << 52;
+
 /// The unit of a column of a table, or the list of its words; empty if words are too long for a unit.
 pub fn unit(table: &Table, column: usize) -> String {
     match table.columns().get(column).map(|column| (column.kind, &column.unit)) {
@@ -81,7 +84,8 @@ pub fn time_refused(
     }
 }
 
-/// The number that codes of a column of whole numbers count from: the smallest one, if the table was surveyed, or that of the first row. `None`
+/// The number that codes of a column of whole numbers count from: the smallest one, if the table was surveyed, or a
+/// multiple of `2^52` below that of the first row, which a source that starts anew has again. `None`
 /// if the selected column at this index has other cells.
 pub fn origin(
     table: &Table,
@@ -98,7 +102,8 @@ pub fn origin(
         Some(Cells::Integers(cells)) => cells.iter().flatten().next().copied(),
         _ => None,
     };
-    Some(least.map(|range| range.0).or(first).unwrap_or(0))
+    let below = |number: i64| number - number.rem_euclid(COARSE);
+    Some(least.map(|range| range.0).or(first.map(below)).unwrap_or(0))
 }
 
 /// The cell of a selected column as a double: the code of a whole number if the recording's column has these.
