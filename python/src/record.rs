@@ -289,6 +289,13 @@ pub(crate) fn verify<'py>(
         .iter()
         .map(|name| playback.schema().position(name))
         .collect::<Result<Vec<_>, _>>()?;
+    for (cells, index) in taken.columns.iter_mut().zip(&matches) {
+        // A column of whole numbers has codes of these.
+        if let Some(integers) = playback.schema().columns()[*index].integers() {
+            let code = |number: f64| integers.code_of(number).unwrap_or(f64::NAN);
+            cells.iter_mut().flatten().for_each(|cell| *cell = code(*cell));
+        }
+    }
     let verdict = py.detach(|| {
         let mut stopped = None;
         let verdict =

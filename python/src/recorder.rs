@@ -85,8 +85,14 @@ impl Recorder {
         let row: Vec<Option<f64>> = schema
             .columns()
             .iter()
-            .map(|one| cells.get(one.name()).copied().flatten())
-            .collect();
+            .map(|one| match (cells.get(one.name()).copied().flatten(), one.integers()) {
+                (Some(number), Some(integers)) => match integers.code_of(number) {
+                    Some(code) => Ok(Some(code)),
+                    None => refused("cells", format!("{number} of '{}'", one.name()), "a whole number of 64 bits"),
+                },
+                (cell, _) => Ok(cell),
+            })
+            .collect::<Outcome<_>>()?;
         Ok(recorder.push(tick, &row)?)
     }
 

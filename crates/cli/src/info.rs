@@ -4,7 +4,7 @@ use crate::arguments::InfoOptions;
 use crate::error::Error;
 use crate::numbers::{exact, widened};
 use crate::{Ending, bounds, clock, output, recording, say};
-use fewbits_record::TimeBase;
+use fewbits_record::{Column, TimeBase};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -30,9 +30,33 @@ struct ColumnInfo {
     name: String,
     unit: String,
     bound: String,
-    min: Option<f64>,
-    max: Option<f64>,
+    min: Option<End>,
+    max: Option<End>,
     gaps: u64,
+}
+
+/// Smallest or largest value of a column.
+#[derive(Clone, Copy, PartialEq, PartialOrd, Serialize)]
+#[serde(untagged)]
+enum End {
+    Number(f64),
+    Whole(i64),
+}
+
+impl End {
+    fn of(column: &Column, value: f64) -> Self {
+        match column.integers() {
+            Some(integers) => Self::Whole(integers.number(value)),
+            None => Self::Number(value),
+        }
+    }
+
+    fn text(self) -> String {
+        match self {
+            Self::Number(value) => exact(value),
+            Self::Whole(number) => number.to_string(),
+        }
+    }
 }
 
 /// Runs the task. It decodes everything once, so that what it reports was verified.
@@ -68,11 +92,13 @@ pub(crate) fn run(options: &InfoOptions) -> Result<Ending, Error> {
         rows += block.rows() as u64;
         blocks += 1;
         span = block.ticks.iter().copied().fold(span, widened);
-        for (info, cells) in columns.iter_mut().zip(&block.columns) {
+        for ((info, cells), column) in columns.iter_mut().zip(&block.columns).zip(schema.columns()) {
             info.gaps += cells.iter().filter(|cell| cell.is_none()).count() as u64;
-            for value in cells.iter().flatten().filter(|value| value.is_finite()) {
-                info.min = Some(info.min.map_or(*value, |min| min.min(*value)));
-                info.max = Some(info.max.map_or(*value, |max| max.max(*value)));
+            let is_value = |value: &&f64| value.is_finite() || column.integers().is_some();
+            for value in cells.iter().flatten().filter(is_value) {
+                let value = End::of(column, *value);
+                info.min = Some(info.min.filter(|min| *min <= value).unwrap_or(value));
+                info.max = Some(info.max.filter(|max| *max >= value).unwrap_or(value));
             }
         }
     }
@@ -145,7 +171,7 @@ fn text(info: &Info) -> String {
             format!(" {}", say::name(&column.unit))
         };
         let ends = match (column.min, column.max) {
-            (Some(min), Some(max)) => format!("{} to {}{unit}", exact(min), exact(max)),
+            (Some(min), Some(max)) => format!("{} to {}{unit}", min.text(), max.text()),
             _ => "no values".to_owned(),
         };
         let _ = writeln!(text, "  {}: {}, {ends}, {} gaps", say::name(&column.name), column.bound, column.gaps);

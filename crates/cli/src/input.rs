@@ -7,7 +7,7 @@ use crate::files::is_regular;
 use crate::opening::{chosen, name_of, time_columns};
 use crate::say::say;
 use fewbits_recipes::{table as recipe, times};
-use fewbits_record::TimeBase;
+use fewbits_record::{Integers, TimeBase};
 use fewbits_table::{Batch, FewCells, Kind};
 
 /// A row: its tick (`None` if rows are numbered) and its cells.
@@ -33,6 +33,8 @@ pub(crate) struct Table {
     /// What reading the table once has shown, if that was done.
     learned: Option<fewbits_table::Survey>,
     pub(crate) names: Vec<String>,
+    /// How the recording's columns code whole numbers.
+    integers: Vec<Option<Integers>>,
 }
 
 /// Results of reading a whole table once.
@@ -69,6 +71,7 @@ impl Table {
             is_told: false,
             row: 0,
             learned,
+            integers: Vec::new(),
         };
         open.rename();
         Ok(open)
@@ -191,11 +194,33 @@ impl Table {
         self.fill().map(|more| !more)
     }
 
-    /// States the words of the columns of a recording, so that cells are the numbers that it has for them.
+    /// The number that codes of whole numbers of the column at an index of `names` count from; `None` if it has other cells.
+    pub(crate) fn origin(&mut self, index: usize) -> Result<Option<i64>, Error> {
+        if self.kind(index) != Kind::Integer {
+            return Ok(None);
+        }
+        self.fill()?;
+        Ok(recipe::origin(&self.table, self.learned.as_ref(), &self.batch, index))
+    }
+
+    /// Codes whole numbers that no double holds from now on, and says how.
+    pub(crate) fn code_integers(&mut self) -> Result<Vec<Option<Integers>>, Error> {
+        let origins: Vec<Option<i64>> = (0..self.names.len())
+            .map(|index| self.origin(index))
+            .collect::<Result<_, _>>()?;
+        self.integers = origins
+            .into_iter()
+            .map(|origin| origin.map(Integers::from_origin))
+            .collect();
+        Ok(self.integers.clone())
+    }
+
+    /// States the words and the codes of the columns of a recording, so that cells are the numbers that it has for them.
     ///
     /// # Errors
     /// If rows that were read ahead have other words.
     pub(crate) fn use_words(&mut self, columns: &[&fewbits_record::Column]) -> Result<(), Error> {
+        self.integers = columns.iter().map(|column| column.integers()).collect();
         recipe::use_words(&mut self.table, &self.batch, columns).map_err(Error::of_table(&self.file))
     }
 
@@ -261,7 +286,10 @@ impl Table {
                 .map_err(|problem| failed(recipe::time_refused(&self.table, &self.batch, row, *found, problem)))?,
             None => None,
         };
-        let cell = |index| recipe::cell(&self.table, &self.batch, index, row);
+        let cell = |index: usize| {
+            let integers = self.integers.get(index).copied().flatten();
+            recipe::cell(&self.table, &self.batch, index, row, integers)
+        };
         let cells = (0..self.batch.columns.len())
             .map(cell)
             .collect::<Result<_, _>>()
@@ -291,8 +319,14 @@ impl Table {
     pub(crate) fn survey(&mut self, options: &TableOptions) -> Result<Survey, Error> {
         let survey = match self.learned.take() {
             Some(survey) => survey,
-            None => chosen(options)?.survey().map_err(Error::of_table(&self.file))?,
+            None => {
+                let survey = chosen(options)?.survey().map_err(Error::of_table(&self.file))?;
+                // Rows behind the first may show another kind.
+                self.table.use_survey(&survey);
+                survey
+            }
         };
+        let survey = self.learned.insert(survey);
         let columns = self.table.selected().iter().map(|i| &survey.columns[*i]);
         Ok(Survey {
             ends: columns.clone().map(|column| column.range).collect(),

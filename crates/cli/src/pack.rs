@@ -8,7 +8,7 @@ use crate::live::{self, RowSink};
 use crate::rows::TableRows;
 use crate::say::say;
 use crate::target::{self, Target};
-use crate::{Ending, bounds};
+use crate::{Ending, bounds, clock};
 use fewbits_recipes::bounds::exact;
 use fewbits_record::{Bound, Column, Effort, Playback, Recorder, Schema, TimeBase};
 use fewbits_table::{Kind, names};
@@ -47,21 +47,20 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
         let problem = "no column of values beside the time: name what separates cells with --delimiter, or the time with --time-column";
         return Err(Error::content(open.file(), problem));
     }
+    // All rows of a file tell what its columns are.
+    let survey: Option<Survey> = match is_regular(&table.file) {
+        true => Some(open.survey(table)?),
+        false => None,
+    };
     check_words(&open)?;
     let mut specs = bounds::parse(&options.bound, &open.names, open.file())?;
     for (i, spec) in specs.iter_mut().enumerate() {
-        // Between two words there is nothing.
-        if matches!(open.kind(i), Kind::Words | Kind::Boolean) {
+        // Between two words there is nothing, and whole numbers beyond doubles are kept as they are.
+        if matches!(open.kind(i), Kind::Words | Kind::Boolean | Kind::Integer) {
             *spec = bounds::LOSSLESS;
         }
     }
     let needs_range = specs.iter().any(|spec| matches!(spec.bound, Bound::ShareOfRange(_)));
-    let has_time = table.time.is_some() || table.time_column.is_some();
-    let survey: Option<Survey> = if is_regular(&table.file) && (needs_range || has_time) {
-        Some(open.survey(table)?)
-    } else {
-        None
-    };
     let unknown = vec![None; specs.len()];
     let ends = survey.as_ref().map_or(&unknown, |survey| &survey.ends);
     let ends: Vec<_> = ends
@@ -73,7 +72,7 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
     let columns: Result<Vec<_>, _> = columns
         .into_iter()
         .enumerate()
-        .map(|(i, column)| with_unit(&open, i, column))
+        .map(|(i, column)| with_unit(&mut open, i, column))
         .collect();
     let columns = columns?;
     let time = open.time_base(table, survey.as_ref())?;
@@ -88,8 +87,12 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
     Ok((open, schema))
 }
 
-/// The column with its unit, or with its words.
-fn with_unit(table: &Table, index: usize, column: Column) -> Result<Column, Error> {
+/// The column with its unit, or with its words, or as one of whole numbers.
+fn with_unit(table: &mut Table, index: usize, column: Column) -> Result<Column, Error> {
+    let column = match table.origin(index)? {
+        Some(origin) => Column::of_integers(column.name(), origin).map_err(Error::recording(table.file()))?,
+        None => column,
+    };
     column
         .with_unit(table.unit(index))
         .map_err(Error::recording(table.file()))
@@ -200,6 +203,22 @@ fn fill<W: Write>(
     Ok((sink, count, None))
 }
 
+/// The tolerance of a recording's times, as `--time` takes it.
+fn own_tolerance(time: TimeBase) -> String {
+    match time {
+        TimeBase::Clock {
+            tolerance: ticks @ 1..,
+            decimals,
+            ..
+        } if decimals <= clock::NANOSECONDS => {
+            // A tick was reserved for decimals beyond one.
+            let tick = 10_u64.pow(u32::from(clock::NANOSECONDS - decimals));
+            format!("±{}ns", ticks.saturating_add(1).saturating_mul(tick))
+        }
+        _ => "exact".to_owned(),
+    }
+}
+
 /// The options with which a table continues a recording: its columns in their order, and its times.
 fn continued(options: &TableOptions, schema: &Schema, file: &str) -> Result<TableOptions, Error> {
     let has_time = schema.time() != TimeBase::Numbered;
@@ -210,7 +229,7 @@ fn continued(options: &TableOptions, schema: &Schema, file: &str) -> Result<Tabl
     }
     Ok(TableOptions {
         // The recording's own tolerance holds.
-        time: has_time.then(|| "exact".to_owned()),
+        time: has_time.then(|| own_tolerance(schema.time())),
         ..options.clone()
     })
 }

@@ -52,6 +52,10 @@ fn fields_of(schema: &Schema) -> arrow_schema::Schema {
     let time = first
         .clone()
         .with_data_type(type_of_times(schema.time(), first.data_type()));
+    let time = match schema.time() {
+        TimeBase::Numbered => time,
+        _ => time.with_name(schema.time_name()),
+    };
     let time = Arc::new(if is_seconds(schema.time()) {
         time.with_metadata(HashMap::new())
     } else {
@@ -108,6 +112,7 @@ impl Sink {
         let schema = kept
             .collect::<Result<_, _>>()
             .and_then(|columns| Schema::new(columns, schema.time()))
+            .and_then(|kept| kept.with_time_name(schema.time_name()))
             .map_err(Error::recording(&file))?;
         let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
         let fields = fields_of(&schema);

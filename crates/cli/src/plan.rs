@@ -23,12 +23,26 @@ pub(crate) fn run(options: &PlanOptions) -> Result<Ending, Error> {
     };
     let time = table.time_base(&options.table, survey.as_ref())?;
     let (file, names) = (table.file().to_owned(), table.names.clone());
+    let integers = table.code_integers()?;
     let mut rows = TableRows::new(table, time);
     let Some(batch) = rows.take(MAX_ROWS)? else {
         return Err(Error::empty(&file, "rows"));
     };
     let mut go = |_| ControlFlow::Continue(());
     let mut plan = recipe(&names, &batch, time, options.rows_per_block, &mut go).map_err(Error::recipe(&file))?;
+    let ends = batch.columns.iter().zip(&integers);
+    for (column, (cells, integers)) in plan.columns.iter_mut().zip(ends) {
+        // Codes stand for whole numbers, which are kept exactly under any bound.
+        if let Some(integers) = integers {
+            let numbers = || cells.iter().flatten().map(|code| integers.number(*code) as f64);
+            (column.min, column.max) = (numbers().reduce(f64::min), numbers().reduce(f64::max));
+            column.steps.clear();
+            column
+                .bounds
+                .iter_mut()
+                .for_each(|bound| bound.2 = column.lossless_bits);
+        }
+    }
     plan.cut = batch.rows() == MAX_ROWS && rows.take(1)?.is_some();
     if let Some(path) = &options.plot {
         picture(&file, &plan).save(path)?;

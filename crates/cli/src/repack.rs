@@ -95,6 +95,15 @@ fn lock(path: &Path) -> Result<File, Error> {
     }
 }
 
+/// Writes the recording as it is to another file.
+fn copy(path: &Path, output: &Path) -> Result<(), Error> {
+    let name = path.display().to_string();
+    let mut source = File::open(path).map_err(Error::io(&name, "open"))?;
+    let mut sink = Target::open(Some(output))?;
+    std::io::copy(&mut source, &mut sink).map_err(Error::io(&name, "copy"))?;
+    sink.finish()
+}
+
 fn one(options: &RepackOptions, file: &str) -> Result<Done, Error> {
     let path = Path::new(file);
     let output = options.output.as_deref().unwrap_or(path);
@@ -107,6 +116,9 @@ fn one(options: &RepackOptions, file: &str) -> Result<Done, Error> {
     }
     let bounds = asked(options, playback.schema(), file)?;
     let Some(schema) = playback.widened(&bounds).map_err(&failed)? else {
+        if let Some(output) = &options.output {
+            copy(path, output)?;
+        }
         return Ok(Done::Kept("no bound would be wider"));
     };
     let schema = schema.with_rows_per_block(options.rows_per_block).map_err(&failed)?;

@@ -56,16 +56,16 @@ fn length(text: &str, time: TimeBase) -> Result<u64, Error> {
     }
 }
 
-/// The columns whose numbers are values: those of words have none.
+/// The columns whose numbers are values: those of words have none, and those of whole numbers of 64 bits are codes.
 fn columns(options: &CatOptions, schema: &Schema, names: Vec<String>) -> Result<Vec<String>, Error> {
     let is_words = |name: &String| {
-        let unit = schema.position(name).map(|i| schema.columns()[i].unit());
-        unit.is_ok_and(|unit| words::of(unit).is_some())
+        let column = schema.position(name).map(|i| &schema.columns()[i]);
+        column.is_ok_and(|column| words::of(column.unit()).is_some() || column.integers().is_some())
     };
     if !options.columns.is_empty()
         && let Some(name) = names.iter().find(|name| is_words(name))
     {
-        return Err(Error::option("--columns", name, "columns of numbers with --every"));
+        return Err(Error::option("--columns", name, "columns of numbers within 53 bits with --every"));
     }
     Ok(names.into_iter().filter(|name| !is_words(name)).collect())
 }

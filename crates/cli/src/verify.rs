@@ -6,6 +6,7 @@ use crate::input::Table;
 use crate::rows::TableRows;
 use crate::{Ending, clock, numbers, output, recording, say};
 use fewbits_recipes::names;
+use fewbits_recipes::unpack::shown as shown_cell;
 use fewbits_recipes::verify::{CellFailure, Verdict, verify as recipe};
 use fewbits_record::{Schema, TimeBase};
 use serde::Serialize;
@@ -35,6 +36,7 @@ struct ShownColumn<'a> {
     name: &'a str,
     bound: &'a str,
     largest_error: f64,
+    mean_error: f64,
     failed: u64,
     first_failures: Vec<String>,
 }
@@ -64,12 +66,21 @@ fn matched(table: &mut Table, options: &TableOptions, schema: &Schema) -> Result
     let time = time_column(&all, schema);
     // Of a long table, some names are those of its own columns.
     let is_own = |name: &&str| options.by.is_none() || schema.position(name).is_ok();
-    let asked: Vec<&str> = options.columns.iter().map(String::as_str).filter(is_own).collect();
+    // A name by number, as `#3`, is that of the table's column.
+    let own = |name: &str| match all.iter().any(|known| known == name) {
+        true => name.to_owned(),
+        false => fewbits_table::names::numbered(name)
+            .and_then(|index| all.get(index).cloned())
+            .unwrap_or_else(|| name.to_owned()),
+    };
+    let of_table = |names: &[String]| names.iter().map(|name| own(name)).collect::<Vec<_>>();
+    let (asked, left_out) = (of_table(&options.columns), of_table(&options.without()));
+    let asked: Vec<&str> = asked.iter().map(String::as_str).filter(is_own).collect();
     let (mut columns, mut matches) = (Vec::new(), Vec::new());
     for (index, column) in schema.columns().iter().enumerate() {
         let name = column.name();
         let is_asked = asked.is_empty() || asked.contains(&name);
-        if !is_asked || options.without().iter().any(|out| out == name) {
+        if !is_asked || left_out.iter().any(|out| out == name) {
             continue;
         }
         let found = (0..all.len()).find(|i| all[*i] == name && Some(*i) != time && !columns.contains(i));
@@ -128,13 +139,18 @@ pub(crate) fn run(options: &VerifyOptions) -> Result<Ending, Error> {
     Ok(if verdict.holds { Ending::Good } else { Ending::Failed })
 }
 
-fn failure(failure: &CellFailure, time: TimeBase) -> String {
-    let told = |cell: Option<f64>| cell.map_or("a gap".to_owned(), |value| value.to_string());
+fn failure(failure: &CellFailure, schema: &Schema, name: &str) -> String {
+    let column = schema.position(name).map(|i| &schema.columns()[i]);
+    let told = |cell: Option<f64>| match (cell, &column) {
+        (None, _) => "a gap".to_owned(),
+        (Some(value), Ok(column)) => shown_cell(column, value),
+        (Some(value), Err(_)) => value.to_string(),
+    };
     let (sample, restored) = (told(failure.sample), told(failure.restored));
     format!(
         "row {} (tick {}): {sample} was restored as {restored}",
         failure.row,
-        clock::shown(failure.tick, time)
+        clock::shown(failure.tick, schema.time())
     )
 }
 
@@ -143,11 +159,12 @@ fn shown<'a>(verdict: &'a Verdict, schema: &Schema, finished: bool) -> Shown<'a>
         name: &column.name,
         bound: &column.bound,
         largest_error: column.largest_error,
+        mean_error: column.mean_error,
         failed: column.failed,
         first_failures: column
             .first_failures
             .iter()
-            .map(|one| failure(one, schema.time()))
+            .map(|one| failure(one, schema, &column.name))
             .collect(),
     });
     Shown {
@@ -173,8 +190,9 @@ fn text(verdict: &Shown<'_>) -> String {
             0 => "holds".to_owned(),
             failed => format!("FAILS in {failed} rows"),
         };
-        let (name, largest) = (say::name(column.name), numbers::short(column.largest_error));
-        let _ = writeln!(text, "{name}: {} {state}, largest error {largest}", column.bound);
+        let (largest, mean) = (numbers::short(column.largest_error), numbers::short(column.mean_error));
+        let (name, bound) = (say::name(column.name), column.bound);
+        let _ = writeln!(text, "{name}: {bound} {state}, largest error {largest}, mean {mean}");
         for failure in &column.first_failures {
             let _ = writeln!(text, "  {failure}");
         }

@@ -3,11 +3,14 @@
 use crate::error::Failure;
 use crate::source::{Batch, Source};
 use crate::{times, words};
-use fewbits_record::TimeBase;
+use fewbits_record::{Integers, TimeBase};
 use fewbits_table::{Cells, Kind, Scale, Table, Time, names};
 
 /// Number of rows per batch.
 const ROWS: usize = 512;
+
+/// Distance of the origins that are chosen by a first row.
+const COARSE: i64 = 1 << 52;
 
 /// The unit of a column of a table, or the list of its words; empty if words are too long for a unit.
 pub fn unit(table: &Table, column: usize) -> String {
@@ -19,7 +22,7 @@ pub fn unit(table: &Table, column: usize) -> String {
     }
 }
 
-/// States the words of the selected columns as the columns of a recording have them, so that cells are the numbers that it has for them.
+/// States the words and the whole numbers of the selected columns as the columns of a recording have them, so that cells are the numbers that it has for them.
 /// `batch`: rows that were read before.
 ///
 /// # Errors
@@ -31,6 +34,9 @@ pub fn use_words(
 ) -> Result<(), fewbits_table::Error> {
     let selected = table.selected().to_vec();
     for (i, (column, recorded)) in selected.into_iter().zip(columns).enumerate() {
+        if recorded.integers().is_some() {
+            table.expect_integers(column);
+        }
         let Some(words) = words::of(recorded.unit()) else {
             continue;
         };
@@ -78,17 +84,59 @@ pub fn time_refused(
     }
 }
 
-/// The cell of a selected column as a double.
+/// The number that codes of a column of whole numbers count from: the smallest one, if the table was surveyed, or a
+/// multiple of `2^52` below that of the first row, which a source that starts anew has again. `None`
+/// if the selected column at this index has other cells.
+pub fn origin(
+    table: &Table,
+    survey: Option<&fewbits_table::Survey>,
+    batch: &fewbits_table::Batch,
+    index: usize,
+) -> Option<i64> {
+    let column = *table.selected().get(index)?;
+    if table.columns().get(column)?.kind != Kind::Integer {
+        return None;
+    }
+    let least = survey.and_then(|survey| survey.columns.get(column)?.whole_range());
+    let first = match batch.columns.get(index) {
+        Some(Cells::Integers(cells)) => cells.iter().flatten().next().copied(),
+        _ => None,
+    };
+    let below = |number: i64| number - number.rem_euclid(COARSE);
+    Some(least.map(|range| range.0).or(first.map(below)).unwrap_or(0))
+}
+
+/// The cell of a selected column as a double: the code of a whole number if the recording's column has these.
 ///
 /// # Errors
-/// If no double holds it, or it is a time of a table whose rows have no time.
+/// If no double holds it, it is a time of a table whose rows have no time, or it is no whole number, as the recording expects.
 pub fn cell(
     table: &Table,
     batch: &fewbits_table::Batch,
     index: usize,
     row: usize,
+    integers: Option<Integers>,
 ) -> Result<Option<f64>, fewbits_table::Error> {
     let cells = &batch.columns[index];
+    if let Some(integers) = integers {
+        if let Cells::Integers(cells) = cells {
+            return Ok(cells[row].map(|number| integers.code(number)));
+        }
+        let refused = |cell: String| fewbits_table::Error::Cell {
+            place: batch.places.get(row).copied().unwrap_or_default(),
+            column: table.columns()[table.selected()[index]].name.clone(),
+            cell,
+            problem: "is no whole number of 64 bits, as all others of the recording's column",
+            mend: "mend the cell, or pack the table into a recording of its own".to_owned(),
+        };
+        return match cells.number(row).map_err(refused)? {
+            None => Ok(None),
+            Some(number) => integers
+                .code_of(number)
+                .map(Some)
+                .ok_or_else(|| refused(number.to_string())),
+        };
+    }
     let has_time = !batch.times.is_empty();
     if let Cells::Times(times) = cells
         && let Some(time) = times[row].filter(|_| !has_time)
@@ -119,8 +167,8 @@ fn cell_refused(
         ),
         Kind::Time => ("is a time, and its seconds are no double", "leave the column out with --without"),
         _ => (
-            "is a whole number of more than 53 bits, which no double holds",
-            "split the column, or leave it out with --without",
+            "is a whole number of more than 53 bits, and the rows before have numbers that are none",
+            "pack a file instead of a pipe, or into a recording of its own; or leave the column out with --without",
         ),
     };
     fewbits_table::Error::Cell {
@@ -137,6 +185,8 @@ pub struct TableRows {
     table: Table,
     base: TimeBase,
     batch: fewbits_table::Batch,
+    /// What the codes of each column stand for.
+    integers: Vec<Option<Integers>>,
 }
 
 impl TableRows {
@@ -146,7 +196,14 @@ impl TableRows {
             table,
             base,
             batch: fewbits_table::Batch::default(),
+            integers: Vec::new(),
         }
+    }
+
+    /// States how whole numbers of each selected column are coded.
+    #[must_use]
+    pub fn with_integers(self, integers: Vec<Option<Integers>>) -> Self {
+        Self { integers, ..self }
     }
 
     /// The table.
@@ -167,11 +224,14 @@ impl TableRows {
             times::of_row(*time, self.base).map_err(|problem| time_refused(&self.table, batch, row, *time, problem))
         };
         let ticks: Vec<Option<i64>> = batch.times.iter().enumerate().map(tick).collect::<Result<_, _>>()?;
-        let cells = |index: usize| match &batch.columns[index] {
-            Cells::Numbers(cells) => Ok(cells.clone()),
-            _ => (0..batch.rows)
-                .map(|row| cell(&self.table, batch, index, row))
-                .collect(),
+        let cells = |index: usize| {
+            let integers = self.integers.get(index).copied().flatten();
+            match &batch.columns[index] {
+                Cells::Numbers(cells) if integers.is_none() => Ok(cells.clone()),
+                _ => (0..batch.rows)
+                    .map(|row| cell(&self.table, batch, index, row, integers))
+                    .collect(),
+            }
         };
         let columns = (0..batch.columns.len()).map(cells).collect::<Result<_, _>>()?;
         // Without a column of times there are no ticks, whatever the base is.

@@ -3,7 +3,7 @@
 use crate::error::{Error, Failure};
 use crate::source::{Watch, report};
 use crate::{times, words};
-use fewbits_record::{Block, Schema, TimeBase};
+use fewbits_record::{Block, Column, Integers, Schema, TimeBase};
 
 /// The rows and columns of a recording that are wanted.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -90,7 +90,7 @@ pub fn rows(
 pub enum Cell {
     /// A word, or a time.
     Text(String),
-    /// The number of a row.
+    /// The number of a row, or a whole number of 64 bits.
     Whole(i64),
     /// A number; `None` is a gap.
     Number(Option<f64>),
@@ -104,6 +104,8 @@ impl Cell {
             Self::Whole(number) => number.to_string(),
             Self::Number(None) => String::new(),
             Self::Number(Some(value)) if value.is_nan() => "NaN".to_owned(),
+            // A whole number beyond 53 bits is the double of all its digits; fewer of them name another whole number.
+            Self::Number(Some(value)) if (1e16..9e18).contains(&value.abs()) => (*value as i64).to_string(),
             Self::Number(Some(value)) if *value != 0.0 && (value.abs() < 1e-5 || value.abs() >= 1e16) => {
                 format!("{value:e}")
             }
@@ -117,15 +119,51 @@ impl Cell {
 pub struct Cells {
     time: TimeBase,
     is_numbered: bool,
-    /// Words of the columns that have any.
-    words: Vec<Option<Vec<String>>>,
+    meanings: Vec<Meaning>,
     names: Vec<String>,
+}
+
+/// What the numbers of a column stand for.
+#[derive(Debug, Clone)]
+enum Meaning {
+    Themselves,
+    Words(Vec<String>),
+    Integers(Integers),
+}
+
+impl Meaning {
+    fn of(column: &Column) -> Self {
+        match (column.integers(), words::of(column.unit())) {
+            (Some(integers), _) => Self::Integers(integers),
+            (None, Some(words)) => Self::Words(words),
+            (None, None) => Self::Themselves,
+        }
+    }
+
+    fn cell(&self, value: Option<f64>) -> Cell {
+        match (value, self) {
+            (Some(code), Self::Integers(integers)) => Cell::Whole(integers.number(code)),
+            (Some(index), Self::Words(words)) if index.fract() == 0.0 && index >= 0.0 => {
+                let word = words.get(index as usize).cloned();
+                word.map_or(Cell::Number(value), Cell::Text)
+            }
+            _ => Cell::Number(value),
+        }
+    }
+}
+
+/// A number of a column as text, as rows have it.
+pub fn shown(column: &Column, value: f64) -> String {
+    Meaning::of(column).cell(Some(value)).text()
 }
 
 impl Cells {
     /// Cells of these columns. `is_numbered`: whether rows of a recording without times have their number.
     pub fn new(schema: &Schema, names: &[String], is_numbered: bool) -> Self {
-        let unit = |name: &String| schema.position(name).ok().map(|i| schema.columns()[i].unit());
+        let meaning = |name: &String| {
+            let column = schema.position(name).map(|i| &schema.columns()[i]);
+            column.map_or(Meaning::Themselves, Meaning::of)
+        };
         let first = match schema.time() {
             TimeBase::Numbered => is_numbered.then_some("row"),
             _ => Some(schema.time_name()),
@@ -133,7 +171,7 @@ impl Cells {
         Self {
             time: schema.time(),
             is_numbered,
-            words: names.iter().map(|name| unit(name).and_then(words::of)).collect(),
+            meanings: names.iter().map(meaning).collect(),
             names: first
                 .into_iter()
                 .map(str::to_owned)
@@ -153,13 +191,9 @@ impl Cells {
             TimeBase::Numbered => self.is_numbered.then_some(Cell::Whole(tick)),
             time => Some(Cell::Text(times::shown(tick, time))),
         };
-        let cell = |(value, words): (&Option<f64>, &Option<Vec<String>>)| match (value, words) {
-            (Some(index), Some(words)) if index.fract() == 0.0 && *index >= 0.0 => {
-                let word = words.get(*index as usize).cloned();
-                word.map_or(Cell::Number(*value), Cell::Text)
-            }
-            _ => Cell::Number(*value),
-        };
-        first.into_iter().chain(values.iter().zip(&self.words).map(cell))
+        let cells = values.iter().zip(&self.meanings);
+        first
+            .into_iter()
+            .chain(cells.map(|(value, meaning)| meaning.cell(*value)))
     }
 }

@@ -20,6 +20,8 @@ pub struct ColumnVerdict {
     pub bound: String,
     /// Largest distance of a finite value from the restored one, along the shorter arc on a circle.
     pub largest_error: f64,
+    /// Mean distance of finite values from the restored ones; 0 without any.
+    pub mean_error: f64,
     /// Number of rows whose restored cell breaks the bound.
     pub failed: u64,
     /// The first of them.
@@ -128,6 +130,7 @@ pub fn verify<R: Read + Seek>(
         batch: Batch::default(),
         next: 0,
     };
+    let mut counts = vec![0; matches.len()];
     for block in playback.blocks() {
         let block = match block {
             Ok(block) => block,
@@ -137,7 +140,7 @@ pub fn verify<R: Read + Seek>(
             }
             Err(error) => return Err(error.into()),
         };
-        verdict.compare(&block, schema.time(), &compared, matches, &mut rows)?;
+        verdict.compare(&block, schema.time(), &compared, matches, &mut rows, &mut counts)?;
         report(watch, verdict.rows)?;
     }
     while rows.advance()? {
@@ -159,6 +162,7 @@ impl Verdict {
         columns: &[&Column],
         matches: &[usize],
         rows: &mut Rows<'_>,
+        compared: &mut [u64],
     ) -> Result<(), Error> {
         for (row, tick) in block.ticks.iter().enumerate() {
             if !rows.advance()? {
@@ -174,7 +178,12 @@ impl Verdict {
             for (i, (column, index)) in columns.iter().zip(matches).enumerate() {
                 let (sample, restored) = (rows.batch.columns[i][original], block.columns[*index][row]);
                 let found = &mut self.columns[i];
-                found.largest_error = found.largest_error.max(distance(column, sample, restored));
+                if let Some(error) = distance(column, sample, restored) {
+                    compared[i] += 1;
+                    found.largest_error = found.largest_error.max(error);
+                    // A running mean, which no large sum rounds.
+                    found.mean_error += (error - found.mean_error) / compared[i] as f64;
+                }
                 if column.keeps(sample, restored, block.share_bounds[*index]) {
                     continue;
                 }
@@ -199,21 +208,21 @@ impl ColumnVerdict {
             name: column.name().to_owned(),
             bound: bounds::of_column(column),
             largest_error: 0.0,
+            mean_error: 0.0,
             failed: 0,
             first_failures: Vec::new(),
         }
     }
 }
 
-/// Distance of two finite values, on a circle along the shorter arc; 0 for other cells.
-fn distance(column: &Column, sample: Option<f64>, restored: Option<f64>) -> f64 {
-    let (Some(a), Some(b)) = (sample.filter(|a| a.is_finite()), restored.filter(|b| b.is_finite())) else {
-        return 0.0;
-    };
+/// Distance of two finite values, on a circle along the shorter arc; `None` for other cells. Whole numbers have codes, whose distance is
+/// 0 or means nothing.
+fn distance(column: &Column, sample: Option<f64>, restored: Option<f64>) -> Option<f64> {
+    let (a, b) = (sample.filter(|a| a.is_finite())?, restored.filter(|b| b.is_finite())?);
     let turns = column
         .period()
         .map_or(0.0, |period| period * ((a - b) / period).round());
-    (a - b - turns).abs()
+    Some((a - b - turns).abs())
 }
 
 #[cfg(test)]
@@ -256,6 +265,9 @@ mod tests {
         assert!(found.holds && found.rows == 200 && found.not_compared.is_empty());
         let found = verdict(recording(200), swapped, &[0, 1]);
         assert_eq!((found.holds, found.columns[0].failed, found.columns[0].first_failures.len()), (false, 200, 3));
+        // Row `i` is off by `3 i`.
+        assert_eq!(found.columns[0].largest_error, 597.0);
+        assert!((found.columns[0].mean_error - 298.5).abs() < 1e-9, "{}", found.columns[0].mean_error);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Conversion between blocks and Arrow record batches.
 //!
-//! A batch has one field for time and one of 64-bit floats per column; a gap is `null`.
+//! A batch has one field for time and one of 64-bit floats per column, of 64-bit integers for whole numbers; a gap is `null`.
 //!
 //! | time base | field of time |
 //! |---|---|
@@ -10,6 +10,7 @@
 
 use crate::block::{Block, Cells};
 use crate::error::Error;
+use crate::integers::Integers;
 use crate::recorder::Recorder;
 use crate::schema::{Schema, TimeBase, TimeFormat};
 use arrow_array::cast::AsArray;
@@ -79,7 +80,11 @@ impl Schema {
             (TimeBase::Numbered, None) => Field::new("row", DataType::Int64, false),
         };
         let columns = self.columns.iter().map(|column| {
-            let field = Field::new(&column.name, DataType::Float64, true);
+            let kind = match column.integers {
+                None => DataType::Float64,
+                Some(_) => DataType::Int64,
+            };
+            let field = Field::new(&column.name, kind, true);
             if column.unit().is_empty() {
                 field
             } else {
@@ -113,10 +118,21 @@ impl Block {
         let kept: Vec<usize> = asked.collect();
         let cells = kept
             .iter()
-            .map(|i| Arc::new(self.columns[*i].iter().copied().collect::<Float64Array>()) as ArrayRef);
+            .map(|i| array(&self.columns[*i], schema.columns[*i].integers));
         let arrays: Vec<ArrayRef> = std::iter::once(time).chain(cells).collect();
         let places: Vec<usize> = std::iter::once(0).chain(kept.iter().map(|i| i + 1)).collect();
         Ok(RecordBatch::try_new(Arc::new(fields.project(&places)?), arrays)?)
+    }
+}
+
+/// Cells of a column; codes of whole numbers as these.
+fn array(cells: &[Option<f64>], integers: Option<Integers>) -> ArrayRef {
+    match integers {
+        None => Arc::new(cells.iter().copied().collect::<Float64Array>()),
+        Some(integers) => {
+            let numbers = cells.iter().map(|cell| cell.map(|code| integers.number(code)));
+            Arc::new(numbers.collect::<Int64Array>())
+        }
     }
 }
 
@@ -164,6 +180,24 @@ pub fn cells(name: &str, array: &dyn Array) -> Result<Cells, Error> {
         other => return Err(refuse(format!("`{name}` of {other}"), "numbers: leave the column out, or cast it")),
     };
     found.ok_or_else(|| refuse(format!("`{name}`"), "whole numbers of at most 53 bits: split the column"))
+}
+
+/// The codes of an array of whole numbers, `None` for nulls.
+fn codes(name: &str, array: &dyn Array, integers: Integers) -> Result<Cells, Error> {
+    if *array.data_type() == DataType::Int64 {
+        let numbers = array.as_primitive::<Int64Type>().iter();
+        return Ok(numbers
+            .map(|number| number.map(|number| integers.code(number)))
+            .collect());
+    }
+    let numbers = cells(name, array)?.into_iter();
+    let codes: Option<Cells> = numbers
+        .map(|number| match number {
+            None => Some(None),
+            Some(number) => Some(Some(integers.code_of(number)?)),
+        })
+        .collect();
+    codes.ok_or_else(|| ArgumentError::new("column", format!("`{name}`"), "whole numbers of 64 bits").into())
 }
 
 /// The times of an array as ticks of `10^-decimals` seconds. Timestamps may have any unit; integers are taken as ticks.
@@ -230,8 +264,15 @@ impl<W: Write> Recorder<W> {
             },
             TimeBase::Clock { decimals, .. } => ticks("time", array("time")?, decimals)?,
         };
-        let names = self.schema().columns().iter().map(|column| column.name());
-        let columns: Vec<Cells> = names.map(|name| cells(name, array(name)?)).collect::<Result<_, _>>()?;
+        let columns = self
+            .schema()
+            .columns()
+            .iter()
+            .map(|column| match (column.integers, array(column.name())?) {
+                (Some(integers), array) => codes(column.name(), array, integers),
+                (None, array) => cells(column.name(), array),
+            });
+        let columns: Vec<Cells> = columns.collect::<Result<_, _>>()?;
         let mut row = Vec::with_capacity(columns.len());
         for (i, tick) in ticks.into_iter().enumerate() {
             row.clear();

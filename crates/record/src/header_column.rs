@@ -2,9 +2,10 @@
 
 use crate::bound::{Bound, TENS};
 use crate::codec::{Target, adaptive};
+use crate::column::Column;
 use crate::error::{Damage, Error};
-use crate::schema::Column;
-use crate::wire::{Bytes, VERSION_5, push_text, push_varint, text};
+use crate::integers::Integers;
+use crate::wire::{Bytes, VERSION_5, push_text, push_varint, text, unzigzag, zigzag};
 use fewbits_block_codec::Start;
 use std::f64::consts::TAU;
 
@@ -13,6 +14,8 @@ const HAS_PERIOD: u8 = 0x10;
 const HAS_START: u8 = 0x20;
 const HAS_UNIT: u8 = 0x40;
 const HAS_EARLIER: u8 = 0x80;
+/// Kind of a column of whole numbers.
+const INTEGERS: u8 = 5;
 /// Stored in place of the number of decimals: the double itself follows; twice pi, the circumference of directions in radians.
 const DOUBLE: u8 = 0xff;
 const TURN: u8 = 0xfe;
@@ -79,7 +82,13 @@ pub(crate) fn push_column(body: &mut Vec<u8>, version: u8, column: &Column, shar
         | flag(!column.unit.is_empty(), HAS_UNIT)
         | flag(column.earlier > 0.0, HAS_EARLIER);
     match column.bound {
-        Bound::Lossless => body.push(flags),
+        Bound::Lossless => match column.integers {
+            None => body.push(flags),
+            Some(integers) => {
+                body.push(INTEGERS | flags);
+                push_varint(body, zigzag(integers.origin()));
+            }
+        },
         Bound::Absolute(delta) => {
             body.push(1 | flags);
             push_number(body, delta, version);
@@ -116,9 +125,13 @@ pub(crate) fn push_column(body: &mut Vec<u8>, version: u8, column: &Column, shar
 pub(crate) fn read_column(body: &mut Bytes<'_>) -> Result<(Column, f64, Option<Start>), Error> {
     let name = text(body).map_err(Error::header)?;
     let kind = body.byte().map_err(Error::header)?;
-    let mut share_bound = 0.0;
+    let (mut share_bound, mut integers) = (0.0, None);
     let bound = match kind & !(HAS_PERIOD | HAS_START | HAS_UNIT | HAS_EARLIER) {
         0 => Bound::Lossless,
+        INTEGERS => {
+            integers = Some(Integers::from_origin(unzigzag(body.varint().map_err(Error::header)?)));
+            Bound::Lossless
+        }
         1 => Bound::Absolute(read_number(body).map_err(Error::header)?),
         2 => {
             let share = read_number(body).map_err(Error::header)?;
@@ -136,7 +149,10 @@ pub(crate) fn read_column(body: &mut Bytes<'_>) -> Result<(Column, f64, Option<S
         },
         _ => return Err(Error::Header(Damage::Content("bound"))),
     };
-    let mut column = Column::new(name, bound)?;
+    let mut column = Column {
+        integers,
+        ..Column::new(name, bound)?
+    };
     if kind & HAS_UNIT != 0 {
         column = column.with_unit(text(body).map_err(Error::header)?)?;
     }

@@ -1,15 +1,19 @@
 //! Several recordings as one table in the order of time.
 
 use crate::blocks::Rows;
+use crate::column::Column;
 use crate::error::Error;
+use crate::integers::Integers;
 use crate::playback::{Playback, Row};
-use crate::schema::{Column, Schema, TimeBase};
+use crate::schema::{Schema, TimeBase};
 use fewbits_block_codec::ArgumentError;
 use std::io::{Read, Seek};
 
 /// Rows of one recording.
 struct Source<'a, R> {
     rows: Rows<'a, R>,
+    /// Codes of whole numbers, of this recording and of the first, by their place in a row.
+    codes: Vec<(usize, Integers, Integers)>,
     /// No row has an earlier tick, if it is known.
     first: i64,
     next: Option<Row>,
@@ -39,6 +43,33 @@ fn unit(time: TimeBase) -> TimeBase {
     }
 }
 
+/// Which of the wanted columns have other codes of whole numbers than those of the first recording.
+fn codes(schema: &Schema, first: Option<&Schema>, wanted: &[&str]) -> Result<Vec<(usize, Integers, Integers)>, Error> {
+    let mut found = Vec::new();
+    for (place, name) in wanted.iter().enumerate() {
+        let of = |schema: &Schema| schema.position(name).map(|i| schema.columns[i].integers);
+        match (of(schema)?, first.map_or(Ok(None), of)?) {
+            (Some(own), Some(wanted)) if own != wanted => found.push((place, own, wanted)),
+            (own, wanted) if own.is_some() != wanted.is_some() => {
+                let expected = "whole numbers of 64 bits in all recordings, or in none";
+                return Err(ArgumentError::new("columns", format!("`{name}`"), expected).into());
+            }
+            _ => {}
+        }
+    }
+    Ok(found)
+}
+
+/// A row with the codes of the first recording.
+fn recoded(mut row: Row, codes: &[(usize, Integers, Integers)]) -> Row {
+    for (place, own, wanted) in codes {
+        if let Some(Some(code)) = row.values.get_mut(*place) {
+            *code = wanted.code(own.number(*code));
+        }
+    }
+    row
+}
+
 /// The rows with ticks in `from..=to` of several recordings as one table: at each step the earliest next row, of equal ticks that of the
 /// first recording. Columns are those of the first recording, by their names. A recording is opened when its first tick is reached, so
 /// recordings one after the other take the memory of one block. Damaged bytes give one error per stretch; the iteration continues behind
@@ -51,8 +82,9 @@ pub fn merged<'a, R: Read + Seek>(
     wanted: &[&str],
     (from, to): (i64, i64),
 ) -> Result<Merged<'a, R>, Error> {
-    if let Some(first) = playbacks.first().map(|playback| playback.schema().clone()) {
-        let mut sorted = names(&first);
+    let first = playbacks.first().map(|playback| playback.schema().clone());
+    if let Some(first) = &first {
+        let mut sorted = names(first);
         sorted.sort_unstable();
         for (i, playback) in playbacks.iter().enumerate() {
             let mut others = names(playback.schema());
@@ -73,13 +105,15 @@ pub fn merged<'a, R: Read + Seek>(
     for (i, playback) in playbacks.iter_mut().enumerate() {
         playback.columns(wanted)?;
         // Without an index the first tick is not known: such a recording is open from the beginning.
-        let first = playback.ticks()?.map_or(i64::MIN, |ticks| ticks.0.max(from));
+        let begin = playback.ticks()?.map_or(i64::MIN, |ticks| ticks.0.max(from));
+        let codes = codes(playback.schema(), first.as_ref(), wanted)?;
         let rows = playback.range(from, to);
         later.push((
             i,
             Source {
                 rows,
-                first,
+                codes,
+                first: begin,
                 next: None,
             },
         ));
@@ -104,7 +138,7 @@ impl<R: Read + Seek> Iterator for Merged<'_, R> {
                     continue;
                 }
                 match source.rows.next() {
-                    Some(Ok(row)) => source.next = Some(row),
+                    Some(Ok(row)) => source.next = Some(recoded(row, &source.codes)),
                     Some(Err(error)) => return Some(Err(error)),
                     None => drop(self.open.remove(i)),
                 }

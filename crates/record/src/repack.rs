@@ -4,11 +4,12 @@
 //! bounds. The new header states both ([`Column::earlier_bound`]).
 
 use crate::bound::{Bound, TENS};
+use crate::column::Column;
 use crate::error::Error;
 use crate::playback::Playback;
 use crate::ranges::{self, Ends};
 use crate::recorder::Recorder;
-use crate::schema::{Column, Schema};
+use crate::schema::Schema;
 use fewbits_block_codec::{ArgumentError, Effort};
 use std::io::{Read, Seek, Write};
 
@@ -53,6 +54,8 @@ fn is_share(bound: Bound) -> bool {
 
 /// A column under another bound, and whether that is wider than its present one. If it is not, the values return without loss.
 fn widened(column: &Column, asked: Option<Bound>, found: Found) -> Result<(Column, bool), Error> {
+    // Between two whole numbers there is nothing that a code could stand for.
+    let asked = asked.filter(|_| column.integers.is_none());
     let own = held(column, found);
     let is_wider = match (asked, own) {
         (None | Some(Bound::Lossless), _) => false,

@@ -64,6 +64,13 @@ const OTHERS: [(&str, usize); 26] = [
     ("dic", 11),
 ];
 
+/// Reads digits: their value and what follows.
+pub(crate) fn digits(text: &str, at_most: usize) -> Option<(i64, usize, &str)> {
+    let count = text.bytes().take(at_most).take_while(u8::is_ascii_digit).count();
+    let value = text[..count].parse().ok()?;
+    Some((value, count, &text[count..]))
+}
+
 /// The place of a word in a list of names, by three letters or more of it.
 fn named(word: &str, names: &[&str]) -> Option<usize> {
     let word = word.trim_end_matches('.').to_lowercase();

@@ -1,9 +1,11 @@
 //! Dates and times of day in many spellings: their parts, and what they say of their zone.
 
+pub(crate) use crate::calendar::{NO_SUCH_DATE, Problem, digits};
 use crate::calendar::{checked, day_of_year, is_day_name, month_named, of_week};
 use crate::time::DECIMALS;
+use crate::zones::zone_of;
+pub(crate) use crate::zones::{Zone, offset};
 use jiff::civil::Date;
-use jiff::tz::TimeZone;
 
 /// Order of day, month and year.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -12,8 +14,6 @@ pub(crate) enum Order {
     Dmy,
     Mdy,
 }
-
-pub(crate) use crate::calendar::{NO_SUCH_DATE, Problem};
 
 /// A written time in its parts.
 #[derive(Debug)]
@@ -25,19 +25,6 @@ pub(crate) struct Written {
     /// Whether it is a leap second.
     pub(crate) leap: bool,
     pub(crate) zone: Zone,
-}
-
-/// What a written time says of its zone.
-#[derive(Debug, PartialEq, Eq)]
-pub(crate) enum Zone {
-    Nothing,
-    /// Seconds ahead of UTC.
-    Offset(i64),
-    /// An abbreviation, as `CET`, which several zones may have.
-    Name(String),
-    /// A region, as `Europe/Berlin`.
-    Region(TimeZone),
-    Unknown,
 }
 
 /// The parts of a date with or without a time of day.
@@ -59,7 +46,9 @@ fn parts(text: &str, order: Order) -> Option<Written> {
     let (second, fraction, leap, rest) = if rest.is_empty() || is_offset {
         midnight
     } else {
-        of_day(rest).or_else(|| compact_of_day(rest))?
+        of_day(rest)
+            .or_else(|| marked_of_day(rest))
+            .or_else(|| compact_of_day(rest))?
     };
     Some(Written {
         date,
@@ -68,33 +57,6 @@ fn parts(text: &str, order: Order) -> Option<Written> {
         leap,
         zone: zone_of(rest),
     })
-}
-
-fn zone_of(rest: &str) -> Zone {
-    let rest = rest.trim();
-    // A region behind an offset says no more than the offset.
-    let rest = match rest.split_once('[') {
-        Some((before, region)) if region.ends_with(']') => before.trim(),
-        _ => rest,
-    };
-    if rest.is_empty() {
-        return Zone::Nothing;
-    }
-    match offset(rest) {
-        Some(seconds) => Zone::Offset(seconds),
-        None if (2..=5).contains(&rest.len()) && rest.bytes().all(|c| c.is_ascii_alphabetic()) => {
-            Zone::Name(rest.to_ascii_uppercase())
-        }
-        None if rest.contains('/') => TimeZone::get(rest).map_or(Zone::Unknown, Zone::Region),
-        None => Zone::Unknown,
-    }
-}
-
-/// Reads digits: their value and what follows.
-pub(crate) fn digits(text: &str, at_most: usize) -> Option<(i64, usize, &str)> {
-    let count = text.bytes().take(at_most).take_while(u8::is_ascii_digit).count();
-    let value = text[..count].parse().ok()?;
-    Some((value, count, &text[count..]))
 }
 
 /// Reads a date in an order. A year that stands first with four digits is read in any order.
@@ -150,18 +112,30 @@ fn date(text: &str, order: Order) -> Option<(Result<Date, Problem>, &str)> {
         (_, _, Order::Mdy) => (third, first, second, third_length),
         (_, _, Order::Ymd) => (first, second, third, length),
     };
-    let year = match (year_length, year) {
-        (2, 69..) => year + 1900,
-        (2, _) => year + 2000,
-        (4, _) => year,
+    let year = match year_length {
+        2 => century(year),
+        4 => year,
         _ => return None,
     };
     Some((checked(year, month, day), rest))
 }
 
+/// The year of two digits: of 1969 to 2068.
+pub(crate) fn century(year: i64) -> i64 {
+    match year {
+        69..=99 => year + 1900,
+        0..69 => year + 2000,
+        _ => year,
+    }
+}
+
 /// A week and a day of it, as `-W10-2` or `W102` behind the year.
 fn week(year: i64, text: &str) -> Option<(Result<Date, Problem>, &str)> {
     let (week, count, rest) = digits(text.trim_start_matches('-').strip_prefix('W')?, 2)?;
+    if count == 2 && rest.is_empty() {
+        // A week alone is that of its Monday, as a month alone is that of its first day.
+        return Some((of_week(year, week, 1), rest));
+    }
     let rest = match text.starts_with('-') {
         true => rest.strip_prefix('-')?,
         false => rest,
@@ -231,6 +205,27 @@ pub(crate) fn of_day(text: &str) -> Option<(i64, i128, bool, &str)> {
     }
     let (hours, rest) = half_day(hours, rest)?;
     Some((hours * 3600 + minutes * 60 + seconds, parts, seconds == 60, rest))
+}
+
+/// A time of day behind a date with other marks than colons, as `21.30.00` or `21-30-00`.
+fn marked_of_day(text: &str) -> Option<(i64, i128, bool, &str)> {
+    let mark = text.get(2..3).filter(|mark| matches!(*mark, "." | "-"))?;
+    let is_part = |part: &str| part.len() == 2 && part.bytes().all(|c| c.is_ascii_digit());
+    let is_marked = text.get(5..6) == Some(mark)
+        && [0..2, 3..5, 6..8]
+            .into_iter()
+            .all(|at| text.get(at).is_some_and(is_part));
+    if !is_marked {
+        return None;
+    }
+    let with_colons = format!("{}:{}:{}", &text[..2], &text[3..5], &text[6..8]);
+    let (second, _, leap, _) = of_day(&with_colons)?;
+    let (parts, rest) = match text[8..].strip_prefix(['.', ',']) {
+        Some(behind) => fraction(behind)?,
+        None => (0, &text[8..]),
+    };
+    let (half, rest) = half_day(second / 3600, rest)?;
+    Some((half * 3600 + second % 3600, parts, leap, rest))
 }
 
 /// Minutes and seconds with decimals, as `0:30.5`.
@@ -328,29 +323,4 @@ fn arranged(text: &str) -> Option<String> {
     let year = words.iter().position(|word| is_number(word, 4..=4))?;
     let year = words.remove(year);
     Some(format!("{year}-{month:02}-{day:0>2} {}", words.join(" ")))
-}
-
-/// An offset from UTC in seconds.
-pub(crate) fn offset(text: &str) -> Option<i64> {
-    let text = text.trim();
-    if matches!(text.to_ascii_uppercase().as_str(), "Z" | "UTC" | "GMT" | "UT") {
-        return Some(0);
-    }
-    let text = text.strip_prefix("UTC").or(text.strip_prefix("GMT")).unwrap_or(text);
-    let (sign, rest) = match text.chars().next()? {
-        '+' => (1, &text[1..]),
-        '-' => (-1, &text[1..]),
-        '\u{2212}' => (-1, &text[3..]),
-        _ => return None,
-    };
-    let (hours, _, rest) = digits(rest, 2)?;
-    let minutes = match rest.strip_prefix(':').unwrap_or(rest) {
-        "" => 0,
-        rest => {
-            digits(rest, 2)
-                .filter(|(_, count, rest)| *count == 2 && rest.is_empty())?
-                .0
-        }
-    };
-    (hours <= 18 && minutes < 60).then_some(sign * (hours * 3600 + minutes * 60))
 }

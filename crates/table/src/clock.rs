@@ -2,6 +2,7 @@
 
 use crate::civil;
 use crate::column::{Column, Kind};
+use crate::days::{by_name, may_be_days, may_be_julian};
 use crate::dialect::Dialect;
 use crate::error::Error;
 use crate::guess;
@@ -111,7 +112,10 @@ fn says(column: &Column, sample: &[String], has_named: bool) -> Says {
     }
     if column.kind != Kind::Time {
         let is_short = |cell: &&str| cell.len() <= 6 && cell.bytes().all(|c| c.is_ascii_digit());
-        let is_of_day = OF_DAY.contains(&name.as_str()) && cells.iter().all(is_short);
+        // Also with the zone behind each, as `2130 UTC`.
+        let is_zoned = |cell: &&str| cell.len() == 8 && cell.ends_with(" UTC") && is_short(&&cell[..4]);
+        let is_named = || OF_DAY.contains(&name.as_str()) || name.ends_with(" utc");
+        let is_of_day = is_named() && (cells.iter().all(is_short) || cells.iter().all(is_zoned));
         return if is_of_day { Says::OfDay } else { Says::Nothing };
     }
     let is_of_day = |cell: &&str| civil::of_day(cell.trim()).is_some();
@@ -187,10 +191,11 @@ pub(crate) fn guess(
     exact.or_else(like).map(|column| vec![column])
 }
 
-/// The offset that a name states, as `Date Time, GMT-07:00`.
+/// The offset that a name states, as `Date Time, GMT-07:00` and `Time (UTC +1)`.
 fn offset_in(name: &str) -> Option<String> {
     let at = name.find("GMT").or(name.find("UTC"))?;
     let text: String = name[at + 3..]
+        .trim_start()
         .chars()
         .take_while(|c| c.is_ascii_digit() || "+-:".contains(*c))
         .collect();
@@ -246,6 +251,9 @@ pub(crate) fn clock(
     }
     if syntax == Syntax::Number(Unit::Seconds) && dialect.time_format.is_none() && may_be_days(names, &cells) {
         return Err(Err((0, written::DAYS)));
+    }
+    if syntax == Syntax::Number(Unit::Seconds) && dialect.time_format.is_none() && may_be_julian(names, &cells) {
+        return Err(Err((0, written::JULIAN)));
     }
     let has_offset = match &syntax {
         Syntax::Date(order) => cells.iter().any(|cell| guess::has_offset(cell, *order)),
@@ -318,37 +326,6 @@ fn dated_hours(names: &[&str], sample: &[String], format: Option<&str>) -> Optio
         },
     };
     Some(Ok(Syntax::DateAnd(order, behind)))
-}
-
-fn has_date_name(names: &[&str]) -> bool {
-    let is_date = |name: &&str| {
-        let lower = name.to_lowercase();
-        ["date", "datum", "fecha", "yyyyddd", "day"]
-            .iter()
-            .any(|word| lower.contains(word))
-    };
-    names.len() == 1 && names.iter().any(is_date)
-}
-
-/// A year and the day of the year as one number, which only the name of the column tells from a count.
-fn by_name(names: &[&str], cells: &[&str]) -> Option<Syntax> {
-    let is_day =
-        |cell: &&str| cell.len() == 7 && civil::written(cell, Order::Ymd).is_some_and(|found| found.date.is_ok());
-    (has_date_name(names) && !cells.is_empty() && cells.iter().all(is_day)).then_some(Syntax::Date(Order::Ymd))
-}
-
-/// Whether a column of dates has numbers of the size of days since 1900.
-fn may_be_days(names: &[&str], cells: &[&str]) -> bool {
-    let within = |low: f64, high: f64| {
-        !cells.is_empty()
-            && cells
-                .iter()
-                .all(|cell| cell.parse().is_ok_and(|days: f64| (low..high).contains(&days)))
-    };
-    // Times of day as shares of a day have many decimals: 36,500 is in 1999, and 55,000 in 2050.
-    let is_share = |cell: &&str| cell.split_once('.').is_some_and(|(_, places)| places.len() >= 5);
-    (has_date_name(names) && within(20_000.0, 80_000.0))
-        || (names.len() == 1 && cells.iter().any(is_share) && within(36_500.0, 55_000.0))
 }
 
 /// How most of the cells are written: a garbled one must not decide.

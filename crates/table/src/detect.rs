@@ -1,9 +1,10 @@
 //! Detection of a dialect from the first lines of a table.
 
+use crate::delimiter::{cells, delimiter, modal};
 use crate::dialect::{Delimiter, Dialect};
 use crate::error::{Error, Place};
 use crate::head::Head;
-use crate::lines::{MAX_ROW_LINES, Row, Split};
+use crate::lines::{MAX_ROW_LINES, Split};
 use crate::{guess, known, marks, missing, number};
 
 /// What a cell looks like.
@@ -31,85 +32,6 @@ fn look(cell: &str, decimal_comma: bool) -> Look {
     }
 }
 
-fn cells(line: &str, split: Split) -> Vec<String> {
-    let mut row = Row {
-        text: line.as_bytes().to_vec(),
-        ..Row::default()
-    };
-    split.split(&mut row);
-    row.texts()
-}
-
-/// The most frequent number of cells, how many lines have it, and whether the line of names may.
-fn modal(lines: &[&str], split: Split) -> (usize, usize) {
-    let mut counts = std::collections::BTreeMap::new();
-    // The end of the head is data; the beginning may be anything.
-    for line in &lines[lines.len() / 2..] {
-        *counts.entry(cells(line, split).len()).or_insert(0_usize) += 1;
-    }
-    counts.into_iter().max_by_key(|(_, lines)| *lines).unwrap_or((1, 0))
-}
-
-/// The delimiter of lines: the first that splits nearly all of the later ones into equally many cells, at least two.
-fn delimiter(lines: &[&str], quote: u8) -> Delimiter {
-    let candidates = [
-        Delimiter::Byte(b'\t'),
-        Delimiter::Byte(b';'),
-        Delimiter::Byte(b'|'),
-        Delimiter::Byte(b','),
-    ];
-    let later = lines.len() - lines.len() / 2;
-    let score = |delimiter: Delimiter| {
-        let (count, found) = modal(lines, Split { delimiter, quote });
-        (count >= 2).then_some(found)
-    };
-    let consistent = candidates
-        .iter()
-        .copied()
-        .find(|delimiter| score(*delimiter).is_some_and(|found| 10 * found >= 8 * later));
-    // Decimal commas are no delimiters if spaces split all lines alike, the names too, and commas do not.
-    let is_decimal = |delimiter| {
-        let spaces = Split {
-            delimiter: Delimiter::Spaces,
-            quote,
-        };
-        let width = |line: &&str, split| cells(line, split).len();
-        let (words, _) = modal(lines, spaces);
-        delimiter == Delimiter::Byte(b',')
-            && words >= 2
-            && lines.iter().all(|line| width(line, spaces) == words)
-            && lines.first().is_some_and(|line| !line.contains(','))
-    };
-    if let Some(found) = consistent.filter(|found| !is_decimal(*found)) {
-        return found;
-    }
-    let most = candidates
-        .iter()
-        .copied()
-        .filter_map(|delimiter| score(delimiter).map(|found| (found, delimiter)));
-    let best = most
-        .filter(|(found, delimiter)| 2 * found >= later && !is_decimal(*delimiter))
-        .max_by_key(|(found, _)| *found);
-    if let Some((_, found)) = best {
-        return found;
-    }
-    // Columns that are aligned by spaces: every line must have as many words, the first too, so that a date alone is no pair of columns.
-    let spaces = Split {
-        delimiter: Delimiter::Spaces,
-        quote,
-    };
-    let counts: Vec<usize> = lines
-        .iter()
-        .map(|line| cells(line, spaces).len())
-        .filter(|count| *count > 0)
-        .collect();
-    let (count, found) = modal(lines, spaces);
-    if count >= 2 && 10 * found >= 8 * later && counts.first() == Some(&count) {
-        return Delimiter::Spaces;
-    }
-    Delimiter::Byte(b',')
-}
-
 /// What the first lines say beyond the dialect.
 #[derive(Debug, Default)]
 pub(crate) struct Layout {
@@ -131,11 +53,16 @@ pub(crate) fn detect(head: &Head, dialect: &mut Dialect) -> Result<Layout, Error
         .iter()
         .map(|(number, line)| (*number, line.as_str()))
         .collect();
+    let mut is_marked = false;
     if let Some((_, first)) = lines.first()
         && let Some(delimiter) = first.trim().strip_prefix("sep=")
     {
         dialect.delimiter.get_or_insert(delimiter.to_owned());
-        dialect.skip.get_or_insert(1);
+        // What stands behind it is looked at like any other table, unless the user counted the lines.
+        if dialect.skip.is_none() {
+            lines.remove(0);
+            is_marked = true;
+        }
     }
     let comments: Vec<(u64, &str)> = lines.iter().filter(|(_, line)| is_comment(line)).copied().collect();
     lines.retain(|(_, line)| !is_comment(line));
@@ -184,7 +111,11 @@ pub(crate) fn detect(head: &Head, dialect: &mut Dialect) -> Result<Layout, Error
         dialect.decimal = Some(if is_comma { ',' } else { '.' });
     }
     let lines_before = |number: u64| lines.iter().filter(|(line, _)| *line < number).count() as u64;
-    layout(&rows, &comments, count, split, dialect, &lines_before)
+    let found = layout(&rows, &comments, count, split, dialect, &lines_before);
+    if is_marked {
+        *dialect.skip.get_or_insert(0) += 1;
+    }
+    found
 }
 
 /// Lines with those that follow within an open quote.
@@ -246,8 +177,15 @@ fn layout(
         yes > no
     };
     let measured: Vec<usize> = (0..count).filter(|column| is_measured(*column)).collect();
+    // A row has its time: one without is among the settings above the data, numbers or not.
+    let is_timed = |column: &usize| {
+        let times = later.iter().filter(|row| row.get(*column) == Some(&Look::Time)).count();
+        5 * times >= 4 * later.len()
+    };
+    let timed: Vec<usize> = measured.iter().copied().filter(is_timed).collect();
     let is_data = |row: &Vec<Look>| {
         row.len() >= count
+            && timed.iter().all(|column| row[*column] == Look::Time)
             && measured.iter().all(|column| row[*column] != Look::Text)
             && row.iter().any(|look| matches!(look, Look::Number | Look::Time))
     };
@@ -307,13 +245,21 @@ fn layout(
         }),
         Some(data) => {
             let mut header = data - 1;
-            if dialect.units_row.is_none() && dialect.skip_after_names.is_none() {
+            // Lines of marks below the names, as programs of databases draw them.
+            let mut rulers = 0;
+            while header > 0 && marks::is_ruler(&rows[header].1) {
+                (header, rulers) = (header - 1, rulers + 1);
+            }
+            if rulers > 0 {
+                dialect.skip_after_names.get_or_insert(rulers);
+                dialect.units_row.get_or_insert(false);
+            } else if dialect.units_row.is_none() && dialect.skip_after_names.is_none() {
                 let is_units = header > 0
                     && filled(&rows[header - 1].1) == filled(&rows[header].1)
                     && looks[header - 1].first() != Some(&Look::Number)
                     && !looks[header - 1].contains(&Look::Time)
                     && looks[header - 1].contains(&Look::Text)
-                    && known::are_units(&rows[header].1);
+                    && (known::are_units(&rows[header].1) || known::are_units_behind(&rows[header].1));
                 dialect.units_row = Some(is_units);
                 header -= usize::from(is_units);
             } else {
@@ -335,6 +281,9 @@ fn layout(
             }
             // A title or settings above the names are skipped; a short line above the data is no line of names.
             while header > 0 && rows[header].1.len() < count && rows[header - 1].1.len() >= count {
+                if known::are_units(&rows[header].1) {
+                    *dialect.skip_after_names.get_or_insert(0) += 1;
+                }
                 header -= 1;
             }
             dialect.skip = Some(lines_before(rows[header].0));

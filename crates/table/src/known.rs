@@ -53,6 +53,14 @@ pub(crate) fn recognise(lines: &[(u64, String)], dialect: &mut Dialect) {
             dialect.decimal.get_or_insert(',');
         }
         dialect.short_rows = true;
+    } else if ["X,CH", "Time,CH", "X(s),CH"]
+        .iter()
+        .any(|begin| first.starts_with(begin))
+        && first.contains(",Start,Increment")
+    {
+        // Rigol oscilloscopes: names, a line of units with the first time and the step, and rows without these two.
+        set("Rigol", Some(0), false, 1, ",");
+        dialect.short_rows = true;
     } else if first.starts_with("LOCATION,") {
         // EnergyPlus weather: eight lines or fewer, then rows without names.
         let data = lines.iter().position(|(_, line)| line.starts_with("DATA PERIODS"));
@@ -128,11 +136,23 @@ pub(crate) const EPW: [&str; 35] = [
 ];
 
 /// Words that stand for units in a row of their own.
-const UNITS: &str = "ts rn smp volt volts v mv uv kv amp amps a ma ua w mw kw wh kwh mwh hz khz mhz s sec secs second seconds ms us ns \
+const UNITS: &str = "ts rn smp volt volts v vdc vac mv uv kv amp amps a ma ua w mw kw wh kwh mwh hz khz mhz s sec secs second seconds ms us ns msecs usecs nsecs \
     min mins minute minutes h hr hour hours day days m mm cm km um nm ft in inch inches m/s km/h mph kn knots m3 l ml l/s l/min m3/h \
     kg g mg ug t lb pa hpa kpa mpa bar mbar mb psi atm mmhg inhg c k f degc degf deg degrees °c °f °k ℃ ℉ celsius kelvin fahrenheit % \
     percent rh %rh ppm ppb ppt lux lx w/m2 w/m^2 j kj mj n nm db dba dbm ohm ohms kohm mohm s/m us/cm ms/cm ph ntu mg/l ug/m3 µg/m³ \
     sequence mol mmol umol µmol nmol degt nmi yr mo dy mn µg/m3 rad rpm g0 count counts # unitless none unit utc local va var m^3 m² m³ w/m² µs µm µa mm/h umol/m2/s";
+
+/// As [`are_units`] of the cells behind the first, if that is no name of a column: a word for the kind of the row, as `DATAU`.
+pub(crate) fn are_units_behind(cells: &[String]) -> bool {
+    let is_kind = |word: &str| {
+        let word = word.to_lowercase();
+        ["unit", "einheit", "datau"].iter().any(|begin| word.starts_with(begin))
+    };
+    match cells {
+        [first, rest @ ..] => is_kind(first) && are_units(rest),
+        [] => false,
+    }
+}
 
 /// Whether the cells of a row are units: every one that is not empty is a unit's word or stands in brackets, and there is one.
 pub(crate) fn are_units(cells: &[String]) -> bool {

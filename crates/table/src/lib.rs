@@ -46,6 +46,8 @@ mod calendar;
 mod civil;
 mod clock;
 mod column;
+mod days;
+mod delimiter;
 mod detect;
 mod dialect;
 mod ends;
@@ -75,6 +77,7 @@ mod time;
 mod timing;
 mod wide;
 mod written;
+mod zones;
 
 pub use column::{Batch, Cells, Column, Kind, MAX_WORDS};
 pub use dialect::Dialect;

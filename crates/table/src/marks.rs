@@ -4,17 +4,36 @@
 pub(crate) fn has_decimal_commas(rows: &[(u64, Vec<String>)]) -> bool {
     let (mut certain, mut points) = (false, false);
     for cell in rows.iter().flat_map(|(_, cells)| cells) {
-        let size = cell.trim_start_matches(['-', '+', '\u{2212}']);
+        let size = without_exponent(cell.trim_start_matches(['-', '+', '\u{2212}']));
         let is_number = size.bytes().all(|c| c.is_ascii_digit() || matches!(c, b',' | b'.')) && !size.is_empty();
         match (size.split_once(','), is_number) {
             (Some((whole, places)), true) if !whole.contains(',') && !size.contains('.') => {
-                certain |= !places.contains(',') && places.len() != 3 && !places.is_empty();
+                // No group stands behind a zero alone, or behind more than three digits.
+                let is_no_group = places.len() != 3 || whole.starts_with('0') || whole.len() > 3;
+                certain |= !places.contains(',') && is_no_group && !places.is_empty();
             }
             (None, true) => points |= size.split('.').count() == 2,
             _ => {}
         }
     }
     certain && !points
+}
+
+/// The digits before an exponent, as of `1,5E-03`.
+fn without_exponent(size: &str) -> &str {
+    match size.split_once(['e', 'E']) {
+        Some((digits, exponent)) if exponent.parse::<i32>().is_ok() => digits,
+        _ => size,
+    }
+}
+
+/// Whether a line is one of marks alone, as `-----+-----`.
+pub(crate) fn is_ruler(cells: &[String]) -> bool {
+    let is_mark = |cell: &String| cell.chars().all(|c| "-=+|: \u{2500}\u{253c}".contains(c));
+    cells.iter().all(is_mark)
+        && cells
+            .iter()
+            .any(|cell| cell.contains("--") || cell.contains("==") || cell.contains('\u{2500}'))
 }
 
 /// A cell of a column that may have points between groups: three digits behind every point, and without one up to three in all, as in

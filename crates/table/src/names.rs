@@ -47,11 +47,14 @@ pub(crate) fn find(names: &[String], own_names: &[String], wanted: &str) -> Opti
         let mut found = own_names.iter().enumerate().filter(|(_, name)| *name == wanted);
         found.next().filter(|_| found.next().is_none()).map(|(i, _)| i)
     };
-    let number = || {
-        let number: usize = wanted.strip_prefix('#')?.parse().ok()?;
-        (1..=names.len()).contains(&number).then(|| number - 1)
-    };
+    let number = || numbered(wanted).filter(|index| *index < names.len());
     exact.or_else(own).or_else(number)
+}
+
+/// The index that a name by number means: 2 of `#3`.
+pub fn numbered(name: &str) -> Option<usize> {
+    let number: usize = name.strip_prefix('#')?.parse().ok()?;
+    number.checked_sub(1)
 }
 
 /// Names of their own: an empty one is `column_3`, and the second `A` is `A_2`.

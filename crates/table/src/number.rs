@@ -34,7 +34,7 @@ const TOO_LARGE: Problem =
 const TOO_SMALL: Problem = ("is below the smallest double", "write 0, or name it with --missing to make it a gap");
 const TOO_LONG: Problem = (
     "is a whole number that neither a double nor 64 bits hold",
-    "split the column, or leave it out with --without",
+    "name it with --missing if it means a gap, split the column, or leave it out with --without",
 );
 
 /// Powers of ten that are exact doubles.
@@ -227,6 +227,8 @@ pub(crate) fn hint(text: &str) -> &'static str {
         } else {
             "say --thousands ' '"
         }
+    } else if text.contains(CURRENCIES) && !text.ends_with(CURRENCIES) {
+        "a sign in front of the number is not read: take it away, or leave the column out with --without"
     } else if text.starts_with('(') && text.ends_with(')') {
         "if brackets mean a negative number, write a minus; or leave the column out with --without"
     } else if plain && digits > 1 && text.ends_with('-') {
@@ -256,6 +258,9 @@ pub(crate) fn hint(text: &str) -> &'static str {
     }
 }
 
+/// Signs that may stand before a number.
+const CURRENCIES: [char; 4] = ['$', '€', '£', '¥'];
+
 /// Whether a text is likely a number of another spelling, with groups, a decimal comma or a unit.
 pub(crate) fn looks_like_number(text: &str) -> bool {
     let text = text
@@ -264,7 +269,9 @@ pub(crate) fn looks_like_number(text: &str) -> bool {
         .unwrap_or(text);
     let size = text
         .trim_matches(BLANKS)
-        .trim_start_matches(['-', '+', '\'', '\u{2212}']);
+        .trim_start_matches(['-', '+', '\'', '\u{2212}'])
+        .trim_start_matches(CURRENCIES)
+        .trim_start_matches(['-', ' ']);
     if !size.starts_with(char::is_numeric) {
         return false;
     }

@@ -83,11 +83,19 @@ fn by_cells(count: usize, sample: &[String]) -> Option<Vec<Part>> {
     };
     let rows: Vec<Vec<i64>> = sample.iter().map(row).collect::<Option<_>>()?;
     let all = |i: usize, within: std::ops::RangeInclusive<i64>| rows.iter().all(|row| within.contains(&row[i]));
-    if rows.is_empty() || rows.iter().any(|row| row.len() != count) || !all(0, 1700..=2300) {
+    // Years of two digits need a time of day behind them, or they may be anything.
+    if rows.is_empty()
+        || rows.iter().any(|row| row.len() != count)
+        || !(all(0, 1700..=2300) || (count >= 5 && all(0, 0..=99)))
+    {
         return None;
     }
     if (3..=6).contains(&count) && (1..count).all(|i| all(i, i64::from(i < 3)..=ORDER[i].1)) {
         return Some(ORDER[..count].iter().map(|(part, _)| *part).collect());
+    }
+    if count == 2 && all(1, 1..=12) {
+        // Months, if there are more rows than days of the year could be so small.
+        return (rows.len() > 12).then(|| vec![Part::Year, Part::Month]);
     }
     let by_day = [Part::Year, Part::DayOfYear, Part::OfDay];
     (count <= 3 && all(1, 1..=366) && (count < 3 || all(2, 0..=2400))).then(|| by_day[..count].to_vec())

@@ -377,8 +377,8 @@ fn number(text: &str, meaning: &Meaning<'_>) -> Result<Option<f64>, number::Prob
     match parsed {
         Ok(Number::Double(value, _)) => Ok(Some(value).filter(|_| !meaning.gaps.has_number(value))),
         Ok(Number::Whole(_)) => Err((
-            "is a whole number of more than 53 bits among numbers with decimals",
-            "split the column, or leave it out with --without",
+            "is a whole number of more than 53 bits among numbers that are read as doubles",
+            "take a file instead of a pipe if all are whole, split the column, or leave it out with --without",
         )),
         Err(problem) => Err(problem),
     }

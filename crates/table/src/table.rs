@@ -205,6 +205,19 @@ impl Table {
         }
     }
 
+    /// States that a column has whole numbers of 64 bits, where the first rows show only such as doubles hold. A typed column keeps its type.
+    pub fn expect_integers(&mut self, column: usize) {
+        #[cfg(feature = "parquet")]
+        if self.arrow.is_some() {
+            return;
+        }
+        if let Some(column) = self.columns.get_mut(column)
+            && column.kind == Kind::Number
+        {
+            column.kind = Kind::Integer;
+        }
+    }
+
     /// How the table is written, completed by what was detected.
     pub fn dialect(&self) -> &Dialect {
         self.own_dialect.as_ref().unwrap_or(&self.dialect)

@@ -103,7 +103,11 @@ impl Table {
                     },
                     |(place, _)| *place,
                 ),
-                column: own.join(", "),
+                column: columns
+                    .iter()
+                    .map(|i| printable(&self.columns[*i].name))
+                    .collect::<Vec<_>>()
+                    .join(", "),
                 cell: printable(&sample[row]),
                 problem,
                 mend: if self.columns.len() == 1

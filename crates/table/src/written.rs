@@ -41,6 +41,10 @@ pub(crate) const DAYS: Problem = (
     "may be a number of days, as spreadsheets have them",
     "say --time-format excel, or --time-format s if these are seconds",
 );
+pub(crate) const JULIAN: Problem = (
+    "may be a Julian date, a number of days",
+    "say --time-format jd (or mjd), or --time-format s if these are seconds",
+);
 const NO_ZONE: Problem = ("has no offset, rows before have one", "mend the cell, or say --time-zone");
 const DOUBTFUL: Problem = (
     "is no time of that zone, or two (a change of daylight saving)",
@@ -59,7 +63,7 @@ fn number(text: &str, unit: Unit) -> Result<Time, Problem> {
     let is_plain = !(whole.is_empty() && decimals.is_empty())
         && whole.bytes().chain(decimals.bytes()).all(|byte| byte.is_ascii_digit());
     if !is_plain {
-        let value: f64 = text.parse().map_err(|_| NO_TIME)?;
+        let value: f64 = text.replacen(',', ".", 1).parse().map_err(|_| NO_TIME)?;
         return if value.is_finite() && text.contains(['e', 'E']) {
             number(&format!("{value}"), unit)
         } else {
@@ -317,6 +321,7 @@ impl Clock {
             }
         }
         let [year, month, day, hour, minute, second] = parts;
+        let year = civil::century(year);
         let small = |part: i64| i8::try_from(part).map_err(|_| NO_SUCH_DATE);
         let date = match day_of_year {
             Some(day) => calendar::day_of_year(year, day)?,

@@ -100,7 +100,9 @@ impl<'a> Tables<'a> {
         let address = self.address;
         let is_same = |sheet: &Sheet| {
             let names = |schema: &Schema| {
-                let column = |column: &fewbits_record::Column| (column.name().to_owned(), column.unit().to_owned());
+                let column = |column: &fewbits_record::Column| {
+                    (column.name().to_owned(), column.unit().to_owned(), column.integers())
+                };
                 schema.columns().iter().map(column).collect::<Vec<_>>()
             };
             sheet.schema.time() == schema.time() && names(&sheet.schema) == names(&schema)

@@ -329,7 +329,7 @@ fn refusals_name_file_row_column_and_mend() {
     assert!(message.contains("a.csv: not a recording"), "{message}");
     let message = refused(&folder, &["pack", "bad.csv", "--time", "exact", "--time-column", "x", "-o", "x"], b"");
     assert!(message.contains("(row 2), column `x`") && message.contains("is not a time"), "{message}");
-    let message = refused(&folder, &["pack", "-", "-o", "x"], b"n\n18014398509481985\n");
+    let message = refused(&folder, &["pack", "-", "-o", "x"], b"n\n1.5\n18014398509481985\n");
     assert!(message.contains("more than 53 bits"), "{message}");
     let message = refused(&folder, &["pack", "-", "-o", "x"], b"time,x\n2026-01-31T12:00:00Z,1\n");
     assert!(

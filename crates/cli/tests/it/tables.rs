@@ -239,3 +239,99 @@ fn whole_numbers_that_no_double_holds_are_refused() {
     assert_eq!(round_trip("x\n1.5\n\n2.5\n", &["--bound", "lossless"]), "x\n1.5\n\"\"\n2.5\n");
     assert_eq!(round_trip("time,x\n", &["--time", "exact"]), "time,x\n");
 }
+
+#[test]
+fn whole_numbers_of_64_bits_come_back() {
+    let ids = [
+        "1152921504606846977",
+        "1152921504606846979",
+        "",
+        "9223372036854775807",
+        "-9223372036854775808",
+        "7",
+    ];
+    let rows = |first: usize| -> String {
+        let row = |(i, id): (usize, &&str)| format!("{},{id},{}.5\n", first + i, i);
+        ids.iter().enumerate().map(row).collect()
+    };
+    let table = format!("time,id,x\n{}", rows(0));
+    assert_eq!(round_trip(&table, &["--time", "exact", "--bound", "lossless"]), table);
+    // Exactly, whatever the bound of all columns is.
+    let folder = folder(&[
+        ("t.csv", &table),
+        ("u.csv", &format!("time,id,x\n{}", rows(6))),
+        ("small.csv", "time,id,x\n12,5,0.5\n"),
+        ("broken.csv", "time,id,x\n12,5.5,0.5\n"),
+        ("doubles.csv", "time,id,x\n0,5.5,1\n"),
+    ]);
+    let path = folder.path();
+    good(path, &["pack", "t.csv", "--time", "exact", "--bound", "±1000", "-o", "t.fewb"], b"");
+    good(path, &["pack", "u.csv", "--time", "exact", "--bound", "±1000", "-o", "u.fewb"], b"");
+    let column = |text: &str| -> Vec<String> {
+        text.lines()
+            .skip(1)
+            .map(|line| line.split(',').nth(1).unwrap().to_owned())
+            .collect()
+    };
+    assert_eq!(column(&text(&good(path, &["unpack", "t.fewb"], b""))), ids);
+    assert!(text(&good(path, &["verify", "t.csv", "t.fewb"], b"")).contains("all promises hold"));
+    let info = text(&good(path, &["info", "t.fewb"], b""));
+    assert!(info.contains("id: lossless, -9223372036854775808 to 9223372036854775807, 1 gaps"), "{info}");
+    // The first number of more than 53 bits stands behind many others; of a pipe it is then too late.
+    let late: String = (0..3000)
+        .map(|i| format!("{i},{}\n", if i == 2500 { (1_i64 << 60) + 1 } else { i }))
+        .collect();
+    std::fs::write(path.join("late.csv"), format!("time,id\n{late}")).unwrap();
+    for options in [&[] as &[&str], &["--time", "exact"]] {
+        good(path, &[&["pack", "late.csv", "-o", "late.fewb"], options].concat(), b"");
+        assert!(text(&good(path, &["unpack", "late.fewb"], b"")).contains("1152921504606846977\n"));
+        assert!(text(&good(path, &["verify", "late.csv", "late.fewb"], b"")).contains("all promises hold"));
+    }
+    let message = refused(path, &["pack", "-", "-o", "x"], format!("time,id\n{late}").as_bytes());
+    assert!(message.contains("more than 53 bits"), "{message}");
+    // Several recordings count from numbers of their own.
+    let both = column(&text(&good(path, &["unpack", "u.fewb", "t.fewb"], b"")));
+    assert_eq!(both, [ids, ids].concat());
+    // Further rows, also of small numbers alone; no others.
+    good(path, &["pack", "u.csv", "--time", "exact", "--append", "-o", "t.fewb"], b"");
+    good(path, &["pack", "small.csv", "--time", "exact", "--append", "-o", "t.fewb"], b"");
+    let all = column(&text(&good(path, &["unpack", "t.fewb"], b"")));
+    assert_eq!(all, [ids.as_slice(), ids.as_slice(), &["5"]].concat());
+    let message = refused(path, &["pack", "broken.csv", "--time", "exact", "--append", "-o", "t.fewb"], b"");
+    assert!(message.contains("`5.5` is no whole number of 64 bits"), "{message}");
+    good(path, &["pack", "doubles.csv", "--time", "exact", "-o", "d.fewb"], b"");
+    let message = refused(path, &["pack", "t.csv", "--time", "exact", "--append", "-o", "d.fewb"], b"");
+    assert!(message.contains("a recording of its own"), "{message}");
+    // A recording under wider bounds has the same numbers; codes have no means.
+    good(path, &["repack", "t.fewb", "--bound", "*=10%", "-o", "r.fewb"], b"");
+    assert_eq!(column(&text(&good(path, &["unpack", "r.fewb"], b""))), all);
+    assert_eq!(
+        text(&good(path, &["cat", "t.fewb", "--every", "1h"], b""))
+            .lines()
+            .next(),
+        Some("time,x mean")
+    );
+    assert!(refused(path, &["cat", "t.fewb", "--every", "1h", "--columns", "id"], b"").contains("53 bits"));
+}
+
+#[test]
+fn commands_take_what_other_commands_took() {
+    let rows: String = (0..40).map(|i| format!("{i},{}.25,3\n", i % 7)).collect();
+    let folder = folder(&[
+        ("t.csv", &format!("time,x,y\n{rows}")),
+        ("leap.csv", "time,x\n2016-12-31T23:59:58Z,1\n2016-12-31T23:59:59Z,2\n2016-12-31T23:59:60Z,3\n"),
+    ]);
+    let path = folder.path();
+    // Columns by number, in the table that they are columns of.
+    good(path, &["pack", "t.csv", "--time", "exact", "--columns", "#3", "-o", "y.fewb"], b"");
+    assert!(text(&good(path, &["verify", "t.csv", "y.fewb", "--columns", "#3"], b"")).contains("all promises hold"));
+    assert!(refused(path, &["verify", "t.csv", "y.fewb", "--columns", "#2"], b"").contains("no column `x`"));
+    // An output that was asked for is there, though no bound is wider.
+    good(path, &["repack", "y.fewb", "--bound", "lossless", "-o", "copy.fewb"], b"");
+    let bytes = |name: &str| std::fs::read(path.join(name)).unwrap();
+    assert_eq!(bytes("copy.fewb"), bytes("y.fewb"));
+    // The recording's own tolerance of times takes what it took before.
+    good(path, &["pack", "leap.csv", "--time", "±1s", "-o", "leap.fewb"], b"");
+    good(path, &["pack", "leap.csv", "--time", "±1s", "--append", "-o", "leap.fewb"], b"");
+    assert_eq!(text(&good(path, &["unpack", "leap.fewb"], b"")).lines().count(), 7);
+}

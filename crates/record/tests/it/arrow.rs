@@ -4,7 +4,7 @@ use crate::common::{Cells, row_holds, rows, schema};
 use arrow_array::cast::AsArray;
 use arrow_array::types::Float64Type;
 use arrow_array::{ArrayRef, Float32Array, Int64Array, RecordBatch, StringArray, TimestampMillisecondArray};
-use fewbits_record::{Playback, Recorder, Schema, TimeBase, TimeFormat};
+use fewbits_record::{Column, Playback, Recorder, Schema, TimeBase, TimeFormat};
 use std::io::Cursor;
 use std::sync::Arc;
 
@@ -91,4 +91,31 @@ fn other_types_and_missing_columns() {
         .unwrap_err()
         .to_string();
     assert!(message.contains("0 decimals"), "{message}");
+}
+
+#[test]
+fn whole_numbers_of_64_bits_are_integers() {
+    let numbers = [Some(1_i64 << 60), None, Some(-3), Some(i64::MAX)];
+    let columns = vec![Column::of_integers("id", 5).unwrap()];
+    let schema = Schema::new(columns, TimeBase::Numbered).unwrap();
+    let array: ArrayRef = Arc::new(Int64Array::from(numbers.to_vec()));
+    let batch = RecordBatch::try_from_iter([("id", array)]).unwrap();
+    let mut recorder = Recorder::new(Vec::new(), schema.clone());
+    recorder.push_batch(&batch).unwrap();
+    let found = batches(&recorder.finish().unwrap());
+    assert_eq!(
+        found[0].column(1).as_primitive::<arrow_array::types::Int64Type>(),
+        &Int64Array::from(numbers.to_vec())
+    );
+    // Doubles are taken if they are whole.
+    let of = |number: f64| -> ArrayRef { Arc::new(arrow_array::Float64Array::from(vec![number])) };
+    let mut recorder = Recorder::new(Vec::new(), schema);
+    recorder
+        .push_batch(&RecordBatch::try_from_iter([("id", of(7.0))]).unwrap())
+        .unwrap();
+    assert!(
+        recorder
+            .push_batch(&RecordBatch::try_from_iter([("id", of(7.5))]).unwrap())
+            .is_err()
+    );
 }

@@ -13,6 +13,7 @@ mod damage;
 mod frames;
 mod fuzz;
 mod guarantee;
+mod integers;
 mod random;
 mod reading;
 mod repacking;

@@ -12,6 +12,7 @@ mod parquet;
 mod plain;
 mod random;
 mod spellings;
+mod strangers;
 mod times;
 mod unseen;
 

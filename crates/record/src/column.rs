@@ -1,0 +1,214 @@
+//! One column of a recording: name, unit, error bound.
+
+use crate::bound::{Bound, Promise};
+use crate::error::Error;
+use crate::integers::Integers;
+use fewbits_block_codec::ArgumentError;
+
+/// Largest length of a name or a unit in bytes.
+const MAX_NAME: usize = 1 << 10;
+/// Largest number of cells on a circle, for which the codec's indices are exact.
+const MAX_CIRCLE_CELLS: f64 = (1_u64 << 40) as f64;
+
+/// One column: name, unit, error bound.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    pub(crate) name: String,
+    pub(crate) unit: String,
+    pub(crate) bound: Bound,
+    pub(crate) period: Option<f64>,
+    /// Size of the range that a share refers to, if it is known beforehand.
+    pub(crate) range: Option<f64>,
+    /// The bound of the recordings that the samples come from, which adds to the column's own.
+    pub(crate) earlier: f64,
+    /// How its samples stand for whole numbers, if they do.
+    pub(crate) integers: Option<Integers>,
+}
+
+impl Column {
+    /// A column without a unit.
+    ///
+    /// # Errors
+    /// If the name is longer than 1024 bytes, an absolute bound is not positive or its double not finite, a share is not in `(0, 1]`, or
+    /// there are more than 15 decimals.
+    pub fn new(name: impl Into<String>, bound: Bound) -> Result<Self, Error> {
+        Ok(Self {
+            name: text("name", name.into())?,
+            unit: String::new(),
+            bound: bound.checked()?,
+            period: None,
+            range: None,
+            earlier: 0.0,
+            integers: None,
+        })
+    }
+
+    /// A column of whole numbers of 64 bits, which are kept exactly. Its samples are codes: [`Integers::code`] of these numbers. Numbers
+    /// near `origin` take few bits.
+    ///
+    /// # Errors
+    /// If the name is longer than 1024 bytes.
+    pub fn of_integers(name: impl Into<String>, origin: i64) -> Result<Self, Error> {
+        Ok(Self {
+            integers: Some(Integers::from_origin(origin)),
+            ..Self::new(name, Bound::Lossless)?
+        })
+    }
+
+    /// What the samples stand for, if they are codes of whole numbers ([`of_integers`](Self::of_integers)).
+    pub fn integers(&self) -> Option<Integers> {
+        self.integers
+    }
+
+    /// Declares that the samples were restored from a recording within this bound, in units of the column (0: exactly). The distance
+    /// from the original samples is then at most the sum of both bounds, which [`keeps`](Self::keeps) allows.
+    ///
+    /// # Errors
+    /// If it is negative or not finite, or is above 0 while the bound is [`Bound::Decimals`] or [`Bound::Relative`], to which none can be
+    /// added.
+    pub fn with_earlier_bound(self, earlier: f64) -> Result<Self, Error> {
+        if !(earlier >= 0.0 && (2.0 * earlier).is_finite()) {
+            return Err(
+                ArgumentError::new("earlier", earlier, "zero or a positive number whose double is finite").into()
+            );
+        }
+        if earlier > 0.0 && self.integers.is_some() {
+            return Err(ArgumentError::new("earlier", earlier, "zero for a column of whole numbers").into());
+        }
+        if earlier > 0.0 && matches!(self.bound, Bound::Decimals(_) | Bound::Relative { .. }) {
+            let expected = "an absolute bound, a share of the range or lossless for a column with an earlier bound";
+            return Err(ArgumentError::new("bound", format!("{:?}", self.bound), expected).into());
+        }
+        Ok(Self { earlier, ..self })
+    }
+
+    /// Sets the unit of the samples, which is only shown to users.
+    ///
+    /// # Errors
+    /// If it is longer than 1024 bytes.
+    pub fn with_unit(self, unit: impl Into<String>) -> Result<Self, Error> {
+        Ok(Self {
+            unit: text("unit", unit.into())?,
+            ..self
+        })
+    }
+
+    /// Declares that samples are directions on a circle of this circumference (360 for degrees). The bound then holds around the circle,
+    /// and restored values lie in `[0, period)`. No effect on lossless columns.
+    ///
+    /// # Errors
+    /// If `period` is not positive and finite, exceeds `2^40` times the bound, or the bound is [`Bound::Decimals`] or
+    /// [`Bound::Relative`].
+    pub fn with_period(self, period: f64) -> Result<Self, Error> {
+        ArgumentError::positive("period", period)?;
+        if let Bound::Decimals(_) | Bound::Relative { .. } = self.bound {
+            let expected = "an absolute bound, a share of the range or lossless for a column on a circle";
+            return Err(ArgumentError::new("bound", format!("{:?}", self.bound), expected).into());
+        }
+        let smallest = match self.bound {
+            Bound::Absolute(delta) => delta,
+            Bound::ShareOfRange(share) => share * period,
+            Bound::Lossless | Bound::Decimals(_) | Bound::Relative { .. } => period,
+        };
+        if smallest.is_nan() || period / smallest > MAX_CIRCLE_CELLS {
+            return Err(ArgumentError::new("period", period, "at most 2^40 times the bound").into());
+        }
+        Ok(Self {
+            period: Some(period),
+            ..self
+        })
+    }
+
+    /// Sets the range that a share refers to, if it is known beforehand. Without it, it is the range of the rows so far, or on a circle
+    /// the period.
+    ///
+    /// # Errors
+    /// If an end is not finite or `from` is above `to`.
+    pub fn with_range(self, from: f64, to: f64) -> Result<Self, Error> {
+        ArgumentError::finite("from", from)?;
+        ArgumentError::finite("to", to)?;
+        let range = to - from;
+        if range.is_nan() || range < 0.0 || range == f64::INFINITY {
+            return Err(
+                ArgumentError::new("range", format!("{from} to {to}"), "a finite range, `from` below `to`").into()
+            );
+        }
+        Ok(Self {
+            range: Some(range),
+            ..self
+        })
+    }
+
+    /// The name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The unit; empty if there is none.
+    pub fn unit(&self) -> &str {
+        &self.unit
+    }
+
+    /// The error bound.
+    pub fn bound(&self) -> Bound {
+        self.bound
+    }
+
+    /// The bound of the recordings that the samples come from ([`with_earlier_bound`](Self::with_earlier_bound)); 0 if there are none.
+    pub fn earlier_bound(&self) -> f64 {
+        self.earlier
+    }
+
+    /// Circumference of the circle, if samples are directions.
+    pub fn period(&self) -> Option<f64> {
+        self.period
+    }
+
+    /// Whether a restored cell is within the bound of a sample. Gaps, NaN and infinities must have the same bits. `share_bound` is that of
+    /// the block ([`Block::share_bounds`](crate::Block::share_bounds)), for columns with a share.
+    pub fn keeps(&self, sample: Option<f64>, restored: Option<f64>, share_bound: Option<f64>) -> bool {
+        let (Some(sample), Some(restored)) = (sample, restored) else {
+            return sample.is_none() && restored.is_none();
+        };
+        if sample.to_bits() == restored.to_bits() || !sample.is_finite() || !restored.is_finite() {
+            return sample.to_bits() == restored.to_bits();
+        }
+        self.whole_promise(share_bound.unwrap_or(0.0))
+            .holds(sample, restored, self.period)
+    }
+
+    /// The bound relative to the original samples: with that of the recordings that the samples come from.
+    fn whole_promise(&self, share_bound: f64) -> Promise {
+        match self.promise(share_bound) {
+            promise if self.earlier == 0.0 => promise,
+            // The sum may have been rounded down, and both bounds can be reached.
+            Promise::Within(delta) => Promise::Within((delta + self.earlier).next_up()),
+            _ => Promise::Within(self.earlier),
+        }
+    }
+
+    /// The bound in a block; `share_bound` is the value of a share there, 0 for lossless.
+    pub(crate) fn promise(&self, share_bound: f64) -> Promise {
+        match self.bound {
+            Bound::Lossless => Promise::Exact,
+            Bound::Absolute(delta) => Promise::Within(delta),
+            Bound::Decimals(places) => Promise::Decimals(places),
+            Bound::Relative { share, floor } => Promise::Relative { share, floor },
+            Bound::ShareOfRange(_) if share_bound > 0.0 => Promise::Within(share_bound),
+            Bound::ShareOfRange(_) => Promise::Exact,
+        }
+    }
+
+    /// The size of the range that a share refers to, if it is known before the first row.
+    pub(crate) fn known_range(&self) -> Option<f64> {
+        self.period.or(self.range)
+    }
+}
+
+/// A text of at most 1024 bytes.
+pub(crate) fn text(name: &'static str, text: String) -> Result<String, ArgumentError> {
+    if text.len() > MAX_NAME {
+        return Err(ArgumentError::new(name, format!("{} bytes long", text.len()), "at most 1024 bytes"));
+    }
+    Ok(text)
+}

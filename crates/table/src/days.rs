@@ -1,0 +1,53 @@
+//! Whether numbers are likely days: of a year, of spreadsheets, or Julian dates.
+
+use crate::civil;
+use crate::written::{Order, Syntax};
+
+fn has_date_name(names: &[&str]) -> bool {
+    let is_date = |name: &&str| {
+        let lower = name.to_lowercase();
+        ["date", "datum", "fecha", "yyyyddd", "day"]
+            .iter()
+            .any(|word| lower.contains(word))
+    };
+    names.len() == 1 && names.iter().any(is_date)
+}
+
+/// A year and the day of the year as one number, which only the name of the column tells from a count.
+pub(crate) fn by_name(names: &[&str], cells: &[&str]) -> Option<Syntax> {
+    let is_day =
+        |cell: &&str| cell.len() == 7 && civil::written(cell, Order::Ymd).is_some_and(|found| found.date.is_ok());
+    (has_date_name(names) && !cells.is_empty() && cells.iter().all(is_day)).then_some(Syntax::Date(Order::Ymd))
+}
+
+/// Whether a column is named as one of Julian dates and has numbers of their size.
+pub(crate) fn may_be_julian(names: &[&str], cells: &[&str]) -> bool {
+    let [name] = names else { return false };
+    let name = name.to_lowercase();
+    let of = |words: &[&str]| {
+        name.split(|c: char| !c.is_ascii_alphanumeric())
+            .any(|word| words.contains(&word))
+    };
+    let within = |low: f64, high: f64| {
+        !cells.is_empty()
+            && cells
+                .iter()
+                .all(|cell| cell.parse().is_ok_and(|days: f64| (low..high).contains(&days)))
+    };
+    (of(&["jd", "bjd", "hjd", "julian"]) && within(2_300_000.0, 2_600_000.0))
+        || (of(&["mjd"]) && within(15_000.0, 90_000.0))
+}
+
+/// Whether a column of dates has numbers of the size of days since 1900.
+pub(crate) fn may_be_days(names: &[&str], cells: &[&str]) -> bool {
+    let within = |low: f64, high: f64| {
+        !cells.is_empty()
+            && cells
+                .iter()
+                .all(|cell| cell.parse().is_ok_and(|days: f64| (low..high).contains(&days)))
+    };
+    // Times of day as shares of a day have many decimals: 36,500 is in 1999, and 55,000 in 2050.
+    let is_share = |cell: &&str| cell.split_once('.').is_some_and(|(_, places)| places.len() >= 5);
+    (has_date_name(names) && within(20_000.0, 80_000.0))
+        || (names.len() == 1 && cells.iter().any(is_share) && within(36_500.0, 55_000.0))
+}
