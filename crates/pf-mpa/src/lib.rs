@@ -68,6 +68,6 @@ pub use fewbits_core::Error;
 pub use fewbits_filters::{GridFilter, GridInfo, GridWorkspace};
 pub use loading::optimal_loading;
 pub use quantized::{IntervalRule, QuantizedRange, RangeReference};
-pub use ranges::{Height, RangeEstimate, RangeSettings, RangeTracker, Travel};
+pub use ranges::{Height, RangeEstimate, RangeSettings, RangeTracker, Travel, height_of};
 pub use sensor::{RangeNoise, RangeSensor};
 pub use {nalgebra, rand};

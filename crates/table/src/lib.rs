@@ -55,6 +55,7 @@ mod guess;
 mod head;
 mod json;
 mod known;
+mod limits;
 mod lines;
 mod marks;
 mod missing;
@@ -76,7 +77,7 @@ mod timing;
 mod wide;
 mod written;
 
-pub use column::{Batch, Cells, Column, Kind, MAX_WORDS};
+pub use column::{Batch, Cells, Column, Kind, MAX_WORDS, Side};
 pub use dialect::Dialect;
 pub use ends::Sentinel;
 pub use error::{Error, Place, printable};

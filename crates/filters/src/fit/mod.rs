@@ -125,6 +125,9 @@ pub fn fit(instants: &[Instant], sensors: usize, request: &Request) -> Result<Fi
     if request.walk {
         problem.try_walks(relative_to, &mut refused);
     }
+    if request.slope {
+        problem.try_without_slopes(&mut refused);
+    }
     let estimates = problem.errors(&mut refused);
     let (log_likelihood, residuals) = problem.model.log_likelihood(instants)?;
     let tests = tests_of_fit::of(&residuals);
