@@ -235,9 +235,9 @@ pub(crate) struct TrackOptions {
     pub(crate) table: TableOptions,
     #[command(flatten)]
     pub(crate) many: ManyOptions,
-    /// Dynamics model of the state.
-    #[arg(long, value_enum, default_value = "walk")]
-    pub(crate) model: Model,
+    /// Dynamics model of the level. Default: a walk, or a level with a slope if the first rows decide for one and `--change` is not said.
+    #[arg(long, value_enum)]
+    pub(crate) model: Option<Model>,
     /// Report of each sensor: `value` (the measurement), `bit` (its sign relative to the prediction), `word:2` to `word:4` (the
     /// innovation, quantized in 2 to 4 bits); per column as `column=word:3,*=bit`.
     #[arg(long, default_value = "value", value_name = "WHAT")]
@@ -285,12 +285,16 @@ pub(crate) struct TrackOptions {
     /// Improve each estimate by the rows after it: by all (`all`), or by those up to a time later (`30s`). Rows are then written at the end.
     #[arg(long, value_name = "all|LAG")]
     pub(crate) smooth: Option<String>,
-    /// The level is an angle with this period, as 360: values that differ by whole periods are equal.
-    #[arg(long, value_name = "PERIOD")]
-    pub(crate) period: Option<f64>,
+    /// The level is an angle with this period, as 360: values that differ by whole periods are equal. `no`: it is a number. Default: an angle of
+    /// 360 degrees or 2 pi if the first rows jump by nearly that and back as if they went on around the circle.
+    #[arg(long, value_name = "PERIOD|no")]
+    pub(crate) period: Option<String>,
     /// Subtract from each sensor its offset, found from this many first rows. The median of all offsets is zero. Default: no correction.
     #[arg(long, value_name = "ROWS")]
     pub(crate) align: Option<usize>,
+    /// Rows may be so much late, as `60s`: each waits that long, by the times of the rows, for earlier ones. Default: rows are in order.
+    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    pub(crate) late: Option<std::time::Duration>,
     /// File of `fewbits fit -o`: noises, offsets, gains, drifts, thresholds and change that other options do not state.
     #[arg(long, value_name = "FILE.json")]
     pub(crate) settings: Option<PathBuf>,

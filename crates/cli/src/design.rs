@@ -5,6 +5,7 @@ use crate::arguments::{DialectOptions, TableOptions};
 use crate::design_options::{Criterion, DesignOptions, Form};
 use crate::error::Error;
 use crate::input::Table;
+use crate::numbers::short;
 use crate::output;
 use crate::plot::{Layer, Picture};
 use crate::say::say;
@@ -133,6 +134,9 @@ pub(crate) fn run(options: &DesignOptions) -> Result<Ending, Error> {
             });
         }
     };
+    if options.noise.contains(&0.0) {
+        say!("noise 0: {} is taken, which changes no design", short(design::negligible(&prior)));
+    }
     let adc = options.adc.as_deref().map(design::adc).transpose().map_err(option)?;
     let solution = solve(options, prior)?;
     let rounded = adc

@@ -8,7 +8,7 @@ use crate::opening::{chosen, name_of, time_columns};
 use crate::say::say;
 use fewbits_recipes::{table as recipe, times};
 use fewbits_record::{Integers, TimeBase};
-use fewbits_table::{Batch, FewCells, Kind};
+use fewbits_table::{Batch, FewCells, Kind, Side};
 
 /// A row: its tick (`None` if rows are numbered) and its cells.
 pub(crate) type Row = (Option<i64>, Vec<Option<f64>>);
@@ -187,6 +187,17 @@ impl Table {
                 Err(Error::content(&self.file, problem))
             }
         }
+    }
+
+    /// Takes cells as `<0.25` for limits. Returns whether any column has them.
+    pub(crate) fn take_limits(&mut self) -> bool {
+        self.table.take_limits(self.learned.as_ref())
+    }
+
+    /// The side of a cell of the last row that is a limit.
+    pub(crate) fn limit(&self, index: usize) -> Option<Side> {
+        let is_it = |limit: &&(usize, usize, Side)| limit.0 == index && limit.1 + 1 == self.next;
+        self.batch.limits.iter().find(is_it).map(|limit| limit.2)
     }
 
     /// Whether there is no further row.

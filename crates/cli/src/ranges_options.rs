@@ -34,7 +34,7 @@ pub(crate) struct RangesOptions {
     /// Standard deviation of the error of scale; `0` if there is none. Ranges are `1 + scale` times the distance.
     #[arg(long, default_value_t = 0.1, value_name = "DEVIATION")]
     pub(crate) scale: f64,
-    /// Height of the target. Needed if the anchors have heights; it is not estimated.
+    /// Height of the target, which is constant. Default: found from the first ranges of a file, if they tell it.
     #[arg(long, value_name = "HEIGHT", allow_hyphen_values = true)]
     pub(crate) height: Option<String>,
     /// The ranges of one time share an unknown offset: differences of times of arrival, times the speed of propagation.

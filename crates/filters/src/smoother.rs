@@ -5,7 +5,7 @@
 //! beliefs, whatever was observed.
 
 use crate::{Error, kalman};
-use fewbits_core::{Gaussian, LinearDynamics};
+use fewbits_core::{Gaussian, GaussianDynamics, LinearDynamics};
 use fewbits_numerics::linalg::solve_semidefinite;
 use nalgebra::SMatrix;
 
@@ -35,6 +35,34 @@ pub fn smooth_step<const D: usize>(
         filtered.mean() + gain * (smoothed_next.mean() - predicted.mean()),
         keep * filtered.covariance() * keep.transpose() + gain * future * gain.transpose(),
     ))
+}
+
+/// The same along any dynamics with Gaussian noise: [`smooth_step`] with the dynamics linearised at the filtered mean, exact if they are linear.
+///
+/// # Errors
+/// If a covariance is not positive semidefinite, or a moment of the result not finite.
+pub fn smooth_along<const D: usize>(
+    dynamics: &dyn GaussianDynamics<D>,
+    filtered: &Gaussian<D>,
+    smoothed_next: &Gaussian<D>,
+) -> Result<Gaussian<D>, Error> {
+    let (mean, covariance) = (filtered.mean(), filtered.covariance());
+    let transition: SMatrix<f64, D, D> = dynamics.jacobian(mean);
+    let noise = dynamics.noise_covariance_at(mean);
+    let predicted = transition * covariance * transition.transpose() + noise;
+    let predicted = (predicted + predicted.transpose()) * 0.5;
+    let gain = solve_semidefinite(&predicted, &(transition * covariance))?.transpose();
+    // A sum of positive semidefinite terms, in which nothing cancels.
+    let keep = SMatrix::<f64, D, D>::identity() - gain * transition;
+    let future = smoothed_next.covariance() + noise;
+    let found = keep * covariance * keep.transpose() + gain * future * gain.transpose();
+    let next = mean + gain * (smoothed_next.mean() - dynamics.mean(mean));
+    if !next.iter().chain(found.iter()).all(|number| number.is_finite()) {
+        return Err(Error::NotANumber {
+            what: "a smoothed moment",
+        });
+    }
+    Ok(Gaussian::from_trusted_parts(next, (found + found.transpose()) * 0.5))
 }
 
 /// Steady-state variance of a scalar fixed-lag smoother: `V_0 = M`, `V_l = M + C^2 (V_{l-1} - P)` with `C = a M / P`, from the

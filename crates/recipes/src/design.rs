@@ -29,7 +29,7 @@ pub enum Criterion {
 pub struct Task {
     /// What is known of the unknown.
     pub prior: Prior,
-    /// Standard deviation of each sensor's noise, in the unit of the unknown.
+    /// Standard deviation of each sensor's noise, in the unit of the unknown. 0: none, for which [`negligible`] is taken.
     pub deviations: Vec<f64>,
     /// Correlation of the noise of any two sensors.
     pub correlation: f64,
@@ -51,10 +51,13 @@ impl Task {
     /// # Errors
     /// If prior, noise, bits, links and criterion do not go together.
     pub fn search<'a>(&self, progress: &'a mut Watch<'a>) -> Result<Solutions, Error> {
+        let none = negligible(&self.prior);
+        let or_negligible = |deviation: &f64| if *deviation == 0.0 { none } else { *deviation };
+        let deviations: Vec<f64> = self.deviations.iter().map(or_negligible).collect();
         let noise = if self.correlation == 0.0 {
-            Noise::independent_with_deviations(&self.deviations)
+            Noise::independent_with_deviations(&deviations)
         } else {
-            Noise::equicorrelated_with_deviations(&self.deviations, self.correlation)
+            Noise::equicorrelated_with_deviations(&deviations, self.correlation)
         };
         let noise = noise.map_err(refused("noise and correlation"))?;
         let model = ObservationModel::new(self.prior.clone(), noise);
@@ -80,6 +83,16 @@ impl Task {
     }
 }
 
+/// A noise that changes no design: a thousandth of the prior's deviation, and of the smallest gap between its points if it has points.
+pub fn negligible(prior: &Prior) -> f64 {
+    let mut points: Vec<f64> = prior.points().map_or(Vec::new(), |(values, _)| values.to_vec());
+    points.sort_by(f64::total_cmp);
+    let gaps = points.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > 0.0);
+    NEGLIGIBLE * gaps.fold(prior.deviation(), f64::min)
+}
+
+/// Share of a length that is negligible beside it.
+const NEGLIGIBLE: f64 = 1e-3;
 /// Number of different values up to which a sample is taken to be points of mass, and how often each must occur on average.
 const MAX_POINTS: usize = 16;
 const MIN_TIMES: usize = 8;

@@ -129,6 +129,15 @@ impl Cells {
     }
 }
 
+/// On which side of its number a cell says that the measurement is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// `<0.25`.
+    Below,
+    /// `>40`.
+    Above,
+}
+
 /// Rows of a table, by columns.
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
@@ -141,6 +150,8 @@ pub struct Batch {
     pub times: Vec<Time>,
     /// Cells of the columns that were selected, in their order.
     pub columns: Vec<Cells>,
+    /// Cells of limits ([`Table::take_limits`](crate::Table::take_limits)): place of the column in `columns`, row of the batch, side of the number.
+    pub limits: Vec<(usize, usize, Side)>,
 }
 
 impl Batch {
@@ -158,6 +169,7 @@ impl Batch {
             self.columns = kinds.into_iter().map(Cells::of).collect();
         }
         self.rows = 0;
+        self.limits.clear();
         self.places.clear();
         self.times.clear();
     }
@@ -165,6 +177,7 @@ impl Batch {
     pub(crate) fn cut(&mut self) {
         let rows = self.rows;
         self.columns.iter_mut().for_each(|cells| cells.truncate(rows));
+        self.limits.retain(|limit| limit.1 < rows);
         self.places.truncate(rows);
         self.times.truncate(rows);
     }

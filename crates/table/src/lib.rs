@@ -57,6 +57,7 @@ mod guess;
 mod head;
 mod json;
 mod known;
+mod limits;
 mod lines;
 mod marks;
 mod missing;
@@ -79,7 +80,7 @@ mod wide;
 mod written;
 mod zones;
 
-pub use column::{Batch, Cells, Column, Kind, MAX_WORDS};
+pub use column::{Batch, Cells, Column, Kind, MAX_WORDS, Side};
 pub use dialect::Dialect;
 pub use ends::Sentinel;
 pub use error::{Error, Place, printable};

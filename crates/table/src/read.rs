@@ -263,7 +263,9 @@ impl Table {
                 },
                 &mut self.words[*column],
             );
-            if let Err((problem, mend)) = pushed {
+            if let Err((problem, mend)) = pushed
+                && !self.push_limit(batch, i, *column)
+            {
                 return Err(self.cell_refused(*column, problem, mend));
             }
         }

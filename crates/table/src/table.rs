@@ -29,6 +29,8 @@ pub struct Table {
     pub(crate) words: Vec<Vec<String>>,
     /// Whether no further words may come.
     pub(crate) is_fixed: Vec<bool>,
+    /// Whether a column has cells as `<0.25`.
+    pub(crate) has_limits: Vec<bool>,
     pub(crate) clocks: Vec<Option<Clock>>,
     pub(crate) selected: Vec<usize>,
     pub(crate) time: Option<(Vec<usize>, Clock)>,
@@ -87,6 +89,7 @@ impl Table {
             syntax,
             words: vec![Vec::new(); count],
             is_fixed: vec![false; count],
+            has_limits: Vec::new(),
             clocks: vec![None; count],
             selected: (0..count).collect(),
             time: None,

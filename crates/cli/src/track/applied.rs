@@ -101,18 +101,19 @@ pub(super) fn applied(options: &TrackOptions, names: &[String]) -> Result<(Track
     if options.threshold.is_empty() {
         options.threshold = thresholds.join(",");
     }
+    let is_walk = options.model.is_none_or(|model| model == Model::Walk);
     match found.time_constant {
-        Some(seconds) if options.model == Model::Walk && options.change.is_none() => {
+        Some(seconds) if is_walk && options.change.is_none() => {
             let variance = 0.5 * found.change * found.change * seconds;
             // The deviation from the forecast after a second.
             let after = (-variance * (-2.0 / seconds).exp_m1()).sqrt();
-            options.model = Model::Returning;
+            options.model = Some(Model::Returning);
             options.change = Some(format!("{after}/1s"));
             options
                 .prior
                 .get_or_insert(format!("{}±{}", found.mean, variance.sqrt()));
         }
-        None if options.model == Model::Walk && options.change.is_none() => {
+        None if is_walk && options.change.is_none() => {
             options.change = Some(format!("{}/1s", found.change));
         }
         // Of a model with a slope the change is another number.

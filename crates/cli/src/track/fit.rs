@@ -1,7 +1,7 @@
 //! The task `fit`: calibration from a whole table.
 
 use super::applied::{Found, Sensor};
-use super::rows::{Instant, Instants, Kind};
+use super::rows::{Instant, Instants, Kind, Said};
 use crate::Ending;
 use crate::bounds::PerColumn;
 use crate::error::Error;
@@ -10,6 +10,7 @@ use crate::numbers::above_zero;
 use crate::output;
 use fewbits_filters::calibration::{self, Reading};
 use fewbits_filters::fit::{Fit, Quantity, Request, fit};
+use fewbits_table::Side;
 
 /// Runs the task.
 pub(crate) fn run(options: &FitOptions) -> Result<Ending, Error> {
@@ -78,7 +79,22 @@ fn readings(
     names: &[String],
     file: &str,
 ) -> Result<Vec<calibration::Instant>, Error> {
-    let reading = |row: u64, sensor: usize, cell: f64| {
+    let reading = |row: u64, sensor: usize, cell: f64, said: Option<&Said>| {
+        match said.and_then(|said| said.limit) {
+            Some(Side::Below) => {
+                return Ok(Reading::Within {
+                    lower: f64::NEG_INFINITY,
+                    upper: cell,
+                });
+            }
+            Some(Side::Above) => {
+                return Ok(Reading::Within {
+                    lower: cell,
+                    upper: f64::INFINITY,
+                });
+            }
+            None => {}
+        }
         if !bits.contains(&sensor) {
             return Ok(Reading::from(cell));
         }
@@ -95,12 +111,15 @@ fn readings(
         Ok(Reading::Within { lower, upper })
     };
     let instant = |one: &Instant| {
-        let cells = one.reports.iter();
-        let cells = cells.filter_map(|(sensor, cell)| Some((*sensor, cell.filter(|cell| cell.is_finite())?)));
+        let cells = one.reports.iter().enumerate();
+        let cells = cells.filter_map(|(i, (sensor, cell))| {
+            let cell = cell.filter(|cell| cell.is_finite())?;
+            Some((*sensor, cell, one.said.get(i)))
+        });
         Ok(calibration::Instant {
             seconds: one.seconds,
             values: cells
-                .map(|(sensor, cell)| Ok((sensor, reading(one.row, sensor, cell)?)))
+                .map(|(sensor, cell, said)| Ok((sensor, reading(one.row, sensor, cell, said)?)))
                 .collect::<Result<_, Error>>()?,
         })
     };

@@ -35,18 +35,20 @@ pub(super) struct Unknown {
     floor: f64,
 }
 
-/// The step to which values are rounded, if there is one. Values that hardly ever change may all be multiples of a larger step by chance:
-/// theirs is at most that of their decimals.
+/// The step to which values are rounded, if there is one: not finer than their decimals. Values that hardly ever change may all be multiples of
+/// a larger step by chance: theirs is that of their decimals.
 fn rounding(values: &[f64]) -> Option<f64> {
-    let step = fewbits_adaptive::own_steps(values).into_iter().reduce(f64::min)?;
-    if values.windows(2).filter(|pair| pair[0] != pair[1]).count() >= FEWEST_CHANGES {
-        return Some(step);
-    }
     let decimals = (0..=9).map(|decimals| 0.1_f64.powi(decimals)).find(|unit| {
         let off = |value: &f64| (value / unit - (value / unit).round()).abs();
         values.iter().all(|value| off(value) < 1e-6)
     });
-    Some(decimals.map_or(step, |unit| unit.min(step)))
+    let step = fewbits_adaptive::own_steps(values).into_iter().reduce(f64::min)?;
+    let is_known = values.windows(2).filter(|pair| pair[0] != pair[1]).count() >= FEWEST_CHANGES;
+    Some(match decimals {
+        Some(unit) if is_known => unit.max(step),
+        Some(unit) => unit.min(step),
+        None => step,
+    })
 }
 
 impl Settings {
@@ -214,7 +216,7 @@ impl Settings {
             what: "change and noise cannot be found",
             source: source.into(),
         };
-        let found = self
+        let mut found = self
             .world
             .calibrate(&readings, change, self.world.change, &noises)
             .map_err(refused)?;
@@ -225,7 +227,15 @@ impl Settings {
                 ..self.world
             };
             let other = sloping.calibrate(&readings, change, self.world.change, &noises);
-            self.has_slope = other.is_ok_and(|other| other.log_likelihood > found.log_likelihood + SLOPING);
+            if let Some(other) = other
+                .ok()
+                .filter(|other| other.log_likelihood > found.log_likelihood + SLOPING)
+            {
+                self.has_slope = true;
+                if self.may_slope {
+                    (self.world.model, found) = (Model::Velocity, other);
+                }
+            }
         }
         self.world.change = found.change;
         if unknown.noise {

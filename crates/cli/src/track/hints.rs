@@ -1,15 +1,22 @@
 //! What the first rows of a table suggest that no option says.
 
 use super::rows::Instant;
-use crate::arguments::{Model, TrackOptions};
+use crate::arguments::TrackOptions;
 use fewbits_filters::calibration::median;
 
 /// Periods of angles and their like.
 const PERIODS: [f64; 4] = [360.0, std::f64::consts::TAU, 400.0, 24.0];
+/// Those of angles, which are taken for such without being said, and how much larger steps across the ends may be than others.
+const CIRCLES: [f64; 2] = [360.0, std::f64::consts::TAU];
+const AS_SMALL: f64 = 5.0;
+/// Values come so near both ends of the circle, as a share of it.
+const AT_ENDS: f64 = 0.03;
 /// Two values this share of a period apart are near each other on the circle.
 const NEARLY: f64 = 0.8;
 /// Values between which silence is looked at, at least, and share of empty cells.
 const FEWEST: usize = 3;
+/// The same of a table of single reports, in which silence is not seen.
+const FEWEST_ROWS: usize = 10;
 const EMPTY: f64 = 0.5;
 /// An offset is told if it is this many of the sensor's deviations.
 const LARGE: f64 = 1.0;
@@ -36,19 +43,13 @@ pub(super) fn hints(
             .collect();
         let values: Vec<f64> = cells.iter().copied().flatten().collect();
         let steps: Vec<f64> = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
-        if options.period.is_none()
-            && let Some(period) = turns(&values, &steps)
-        {
-            lines.push(format!(
-                "{name} jumps by nearly {period} and back: if it is an angle, say --period {period}; without it these estimates are wrong"
-            ));
-        }
+        let is_long = options.table.by.is_some();
         let silent = (cells.len() - values.len()) as f64;
         let least = steps.iter().fold(f64::INFINITY, |least, step| least.min(*step));
         let typical = median(steps.clone());
         if options.silent_within.is_none()
-            && values.len() >= FEWEST
-            && silent > EMPTY * cells.len() as f64
+            && values.len() >= if is_long { FEWEST_ROWS } else { FEWEST }
+            && (is_long || silent > EMPTY * cells.len() as f64)
             && least > 0.5 * typical
         {
             lines.push(format!(
@@ -67,20 +68,123 @@ pub(super) fn hints(
             0.5 * apart
         ));
     }
-    if options.model == Model::Walk && has_slope {
-        lines.push("the first rows have a slope: --model velocity explains them far better".to_owned());
+    if has_slope {
+        let what = match options.model {
+            None => "which is followed: --model velocity shows it, --model walk leaves it out",
+            Some(_) => "--model velocity explains them far better",
+        };
+        lines.push(format!("the first rows have a slope: {what}"));
     }
     lines
 }
 
-/// The period whose ends the values cross, if there is one.
-fn turns(values: &[f64], steps: &[f64]) -> Option<f64> {
-    let (low, high) = values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)));
-    PERIODS.into_iter().find(|period| {
-        let is_inside = low >= 0.0 && high <= *period || low >= -0.5 * period && high <= 0.5 * period;
-        let crossings = steps.iter().filter(|step| **step > NEARLY * period).count();
-        is_inside && crossings >= 2 && 2 * crossings < steps.len()
-    })
+/// Values of a sensor of which the period is asked.
+#[derive(Debug, Clone, Copy)]
+struct Turns {
+    last: f64,
+    low: f64,
+    high: f64,
+    count: usize,
+    /// Steps by nearly each period.
+    crossings: [usize; PERIODS.len()],
+}
+
+impl Turns {
+    fn new(value: f64) -> Self {
+        Self {
+            last: value,
+            low: value,
+            high: value,
+            count: 0,
+            crossings: [0; PERIODS.len()],
+        }
+    }
+
+    fn add(&mut self, value: f64) {
+        let step = (value - self.last).abs();
+        self.last = value;
+        (self.low, self.high) = (self.low.min(value), self.high.max(value));
+        self.count += 1;
+        for (crossings, period) in self.crossings.iter_mut().zip(PERIODS) {
+            *crossings += usize::from(step > NEARLY * period);
+        }
+    }
+
+    /// The period whose ends the values cross, if there is one.
+    fn period(&self) -> Option<f64> {
+        let is_crossed = |(period, crossings): &(f64, usize)| {
+            let is_inside =
+                self.low >= 0.0 && self.high <= *period || self.low >= -0.5 * period && self.high <= 0.5 * period;
+            is_inside && *crossings >= 2 && 5 * crossings < 3 * self.count
+        };
+        let found = PERIODS.into_iter().zip(self.crossings).find(is_crossed);
+        found.map(|(period, _)| period)
+    }
+
+    fn of(values: &[f64]) -> Option<Self> {
+        let mut all = values.iter();
+        let mut turns = Self::new(*all.next()?);
+        all.for_each(|value| turns.add(*value));
+        Some(turns)
+    }
+}
+
+/// Looks in all rows for values that cross the ends of a period.
+pub(super) struct Turning {
+    is_asked: bool,
+    sensors: Vec<Option<Turns>>,
+}
+
+impl Turning {
+    pub(super) fn new(is_asked: bool) -> Self {
+        Self {
+            is_asked,
+            sensors: Vec::new(),
+        }
+    }
+
+    pub(super) fn add(&mut self, instant: &Instant) {
+        if !self.is_asked {
+            return;
+        }
+        for (sensor, cell) in &instant.reports {
+            let Some(value) = cell.filter(|cell| cell.is_finite()) else {
+                continue;
+            };
+            if self.sensors.len() <= *sensor {
+                self.sensors.resize(sensor + 1, None);
+            }
+            self.sensors[*sensor].get_or_insert(Turns::new(value)).add(value);
+        }
+    }
+
+    /// A line for each sensor that turns.
+    pub(super) fn hints(&self, names: &[String]) -> Vec<String> {
+        let of = |(turns, name): (&Option<Turns>, &String)| {
+            let period = turns.as_ref()?.period()?;
+            Some(format!(
+                "{name} jumps by nearly {period} and back: if it is an angle, say --period {period}; without it these estimates are wrong"
+            ))
+        };
+        self.sensors.iter().zip(names).filter_map(of).collect()
+    }
+}
+
+/// The period of values that go on around a circle: their steps across its ends are as small as others, once a whole turn is taken off.
+pub(super) fn circle(values: &[f64]) -> Option<f64> {
+    let turns = Turns::of(values)?;
+    let period = turns.period().filter(|period| CIRCLES.contains(period))?;
+    if turns.high - turns.low < (1.0 - 2.0 * AT_ENDS) * period {
+        return None;
+    }
+    let (mut across, mut others) = (Vec::new(), Vec::new());
+    for pair in values.windows(2) {
+        let step = (pair[1] - pair[0]).abs();
+        if step > NEARLY * period {
+            across.push(period - step);
+        } else {
+            others.push(step);
+        }
+    }
+    (median(across) <= AS_SMALL * median(others)).then_some(period)
 }

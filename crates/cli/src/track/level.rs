@@ -1,6 +1,7 @@
 //! Tracking of a level that sensors measure: estimates with bands, row by row.
 
 use super::centre::{Estimator, Step, Use, centre};
+use super::hints::Turning;
 use super::report::{BAND, cells, first_cell, first_name, summarise};
 use super::rhythm::Rhythm;
 use super::rows::{Instant, Instants};
@@ -254,8 +255,8 @@ fn text(step: &Step, names: &[String]) -> String {
 pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Ending, Error> {
     let settings = Settings::find(options, &mut instants)?;
     let parts: &[&str] = match options.model {
-        Model::Velocity => &["level", "slope"],
-        Model::Acceleration => &["level", "slope", "curvature"],
+        Some(Model::Velocity) => &["level", "slope"],
+        Some(Model::Acceleration) => &["level", "slope", "curvature"],
         _ => &["level"],
     };
     let columns = parts
@@ -265,6 +266,8 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
     let names = std::iter::once(first_name(&instants).to_owned())
         .chain(columns)
         .chain(last);
+    let shown = (settings.circle, parts.len());
+    let mut turning = Turning::new(settings.world.period.is_none() && options.period.is_none() && !options.reports);
     let mut run = Run::new(options, settings, &instants)?;
     let mut sheet = Sheet::new(options.output.as_deref(), Shape::of(options.json), names.collect())?;
     let lag = options.smooth.as_deref().map(lag).transpose()?;
@@ -275,6 +278,7 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
             rhythm.fill(&mut instant);
         }
         let step = run.step(&instant, &instants.names)?;
+        turning.add(&instant);
         if !options.reports {
             let values = instant
                 .reports
@@ -288,7 +292,7 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
         if lag.is_some() {
             waiting.push((first, step, events));
         } else {
-            sheet.write(cells(options, first, &step.estimate, &step, events))?;
+            sheet.write(cells(shown, first, &step.estimate, &step, events))?;
         }
     }
     if let Some(lag) = lag {
@@ -297,11 +301,12 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
             source,
         })?;
         for ((first, step, events), estimate) in waiting.into_iter().zip(&smoothed) {
-            sheet.write(cells(options, first, estimate, &step, events))?;
+            sheet.write(cells(shown, first, estimate, &step, events))?;
         }
     }
     sheet.finish()?;
     run.summary.copies = instants.copies;
+    run.summary.hints.extend(turning.hints(&instants.names));
     let (summary, picture) = run.finish(options)?;
     if let Some(path) = &options.plot {
         picture.save(path)?;

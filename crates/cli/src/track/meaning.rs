@@ -3,6 +3,7 @@
 use super::rows::Said;
 use crate::report::Report;
 use fewbits_recipes::stated::StatedReading;
+use fewbits_table::Side;
 
 /// Model of a sensor.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +30,8 @@ pub(super) struct Meaning {
     pub(super) limits: (Option<f64>, Option<f64>),
     /// Rows state the accuracy of their values.
     pub(super) has_accuracy: bool,
+    /// Cells may be limits.
+    pub(super) has_limits: bool,
 }
 
 impl Meaning {
@@ -36,6 +39,7 @@ impl Meaning {
         self.step.is_some()
             || self.silent_within.is_some()
             || self.has_accuracy
+            || self.has_limits
             || self.limits.0.is_some()
             || self.limits.1.is_some()
     }
@@ -76,6 +80,11 @@ impl Seat {
         }
         if let Some(most) = most.map(|most| most - self.offset).filter(|most| value >= *most) {
             (reading.lower, reading.upper) = (most, f64::INFINITY);
+        }
+        match said.limit {
+            Some(Side::Below) => (reading.lower, reading.upper) = (f64::NEG_INFINITY, value),
+            Some(Side::Above) => (reading.lower, reading.upper) = (value, f64::INFINITY),
+            None => {}
         }
         Some(reading)
     }

@@ -10,19 +10,23 @@
 //! | `first` | values of the first rows |
 //! | `found` | what is found from the first rows |
 //! | `hints` | what the first rows suggest that no option says |
+//! | `late` | rows that come late |
 //! | `rhythm` | silence in a table of single reports |
 //! | `report` | first cell of a row, summary |
 //! | `applied` | what `fit` found, as settings |
 //! | `fit` | the task `fit`: calibration |
 //! | `level` | the task `track`: a level |
 //! | `ranges` | the task `ranges`: a place |
+//! | `height` | the height of its target |
 
 mod applied;
 mod centre;
 mod first;
 mod fit;
 mod found;
+mod height;
 mod hints;
+mod late;
 mod level;
 mod meaning;
 mod ranges;
@@ -40,7 +44,7 @@ use rows::{Instants, Kind};
 /// Runs the task.
 pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {
     match (options.model, &options.anchors) {
-        (Model::Ranges, Some(anchors)) => ranges(&ranges::options(options, anchors)?),
+        (Some(Model::Ranges), Some(anchors)) => ranges(&ranges::options(options, anchors)?),
         (_, Some(_)) => Err(Error::Needed {
             option: "--model ranges",
             reason: "--anchors says where ranges are measured from",

@@ -1,5 +1,6 @@
 //! Tracking of a position by distances to anchors.
 
+use super::height::height_found;
 use super::report::{first_cell, first_name, summarise};
 use super::rows::Instants;
 use super::sensors;
@@ -7,7 +8,7 @@ use crate::Ending;
 use crate::arguments::{RangesOptions, TableOptions, TrackOptions};
 use crate::error::Error;
 use crate::input::Table;
-use crate::numbers::number;
+use crate::numbers::{number, short};
 use crate::output::{Cell, Shape, Sheet};
 use crate::plot::{Layer, Picture, Thinned};
 use crate::report::Report;
@@ -16,8 +17,11 @@ use fewbits_record::TimeBase;
 use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 
+/// A track that is lost once in so many rows is lost often.
+const OFTEN: u64 = 20;
+
 /// Name and place of an anchor.
-type Anchor = (String, Vector3<f64>);
+pub(super) type Anchor = (String, Vector3<f64>);
 
 #[derive(Serialize)]
 struct Summary {
@@ -31,6 +35,8 @@ struct Summary {
     ambiguous: u64,
     losses: usize,
     anchors: Vec<AnchorSummary>,
+    /// What the ranges suggest that no option says.
+    hints: Vec<String>,
 }
 
 #[derive(Serialize)]
@@ -106,15 +112,9 @@ fn read_anchors(file: &str) -> Result<Vec<Anchor>, Error> {
     Ok(anchors)
 }
 
-fn settings(options: &RangesOptions, anchors: &[Anchor]) -> Result<RangeSettings, Error> {
-    const EXPECTED: &str = "a known height as `0.3`; heights are not estimated";
+fn settings(options: &RangesOptions) -> Result<RangeSettings, Error> {
+    const EXPECTED: &str = "a height as `0.3`";
     let height = match options.height.as_deref() {
-        None if anchors.iter().any(|(_, place)| place.z != 0.0) => {
-            return Err(Error::Needed {
-                option: "--height",
-                reason: "the anchors have heights, and that of the target is not estimated",
-            });
-        }
         None => Height::Unsaid,
         Some(text) => Height::Known(number("--height", text, EXPECTED)?),
     };
@@ -170,8 +170,27 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
         Report::Sign => Travel::Bits(1),
         Report::Word { bits } => Travel::Bits(bits),
     };
-    let mut tracker = RangeTracker::new(anchors.iter().cloned(), travel, settings(options, &anchors)?)
-        .map_err(Error::refused("the tracker of ranges is refused"))?;
+    let refused = Error::refused("the tracker of ranges is refused");
+    let mut settings = settings(options)?;
+    let mut hints = Vec::new();
+    let is_flat = anchors.iter().all(|(_, place)| place.z == 0.0);
+    if let Some(height) = height_found(options, &anchors, settings, &mut instants)? {
+        settings.height = Height::Known(height);
+        let height = short(height);
+        hints.push(if is_flat {
+            format!(
+                "the ranges say that the target is {height} higher or lower than the anchors: taken, as --height {height} says; --height 0 leaves it out"
+            )
+        } else {
+            format!("the ranges say that the target is at the height {height}: taken, as --height {height} says")
+        });
+    } else if !is_flat && options.height.is_none() {
+        return Err(Error::Needed {
+            option: "--height",
+            reason: "the anchors have heights, and the first ranges do not tell that of the target",
+        });
+    }
+    let mut tracker = RangeTracker::new(anchors.iter().cloned(), travel, settings).map_err(refused)?;
     let known = |name: &str| anchors.iter().position(|(known, _)| known == name);
     if let Some(name) = instants.names.iter().find(|name| known(name).is_none()) {
         return Err(unknown(instants.file(), name, file));
@@ -189,6 +208,7 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
         searching: 0,
         ambiguous: 0,
         losses: 0,
+        hints: Vec::new(),
         anchors: anchors
             .iter()
             .map(|(name, _)| AnchorSummary {
@@ -201,8 +221,9 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
     let mut path = Thinned::new();
     while let Some(instant) = instants.next()? {
         let (mut found, mut ranges, mut events) = (None, 0, "");
-        for (sensor, range) in &instant.reports {
-            let Some(range) = range.filter(|range| range.is_finite()) else {
+        for (i, (sensor, range)) in instant.reports.iter().enumerate() {
+            let is_limit = instant.said.get(i).is_some_and(|said| said.limit.is_some());
+            let Some(range) = range.filter(|range| range.is_finite() && !is_limit) else {
                 continue;
             };
             let name = &instants.names[*sensor];
@@ -259,7 +280,15 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
     if let Some(file) = &options.plot {
         picture(&anchors, path.points(), &summary).save(file)?;
     }
-    summarise(&summary, &lines(&summary, &tracker, options.silence), options.json)?;
+    summary.hints = hints;
+    if summary.losses as u64 > summary.rows / OFTEN && !options.unknown_clock {
+        summary.hints.push(
+            "the track is lost often: if the ranges of one time share an unknown offset, say --unknown-clock; otherwise --speed, --noise or --outliers"
+                .to_owned(),
+        );
+    }
+    let lines = lines(&summary, &tracker, options.silence);
+    summarise(&summary, &lines, options.json)?;
     Ok(Ending::Good)
 }
 
@@ -277,6 +306,7 @@ fn lines(summary: &Summary, tracker: &RangeTracker, silence: f64) -> Vec<String>
             summary.ambiguous
         ));
     }
+    lines.extend(summary.hints.iter().cloned());
     for anchor in &summary.anchors {
         if anchor.ranges == 0 {
             lines.push(format!("no range from anchor {}", anchor.name));

@@ -2,7 +2,6 @@
 
 use super::centre::Step;
 use super::rows::Instants;
-use crate::arguments::TrackOptions;
 use crate::error::Error;
 use crate::output::Cell;
 use crate::say::say;
@@ -34,23 +33,34 @@ pub(super) fn summarise(summary: &impl serde::Serialize, lines: &[String], json:
     Ok(())
 }
 
-/// The cells of a row of a level.
+/// An angle: its period, and the end of the period within which it is written.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Circle {
+    pub(super) period: f64,
+    pub(super) low: f64,
+}
+
+/// The cells of a row of a level: of a circle, if it is an angle, and so many coordinates.
 pub(super) fn cells(
-    options: &TrackOptions,
+    (circle, coordinates): (Option<Circle>, usize),
     first: Cell,
     estimate: &[(f64, f64)],
     step: &Step,
     events: String,
 ) -> Vec<Cell> {
-    // An angle is written within its first period.
-    let turns = match (options.period, estimate.first()) {
-        (Some(period), Some((level, _))) => period * (level / period).floor(),
+    // An angle is written within one period.
+    let turns = match (circle, estimate.first()) {
+        (Some(circle), Some((level, _))) => circle.period * ((level - circle.low) / circle.period).floor(),
         _ => 0.0,
     };
-    let estimates = estimate.iter().enumerate().flat_map(|(i, (mean, deviation))| {
-        let mean = if i == 0 { mean - turns } else { *mean };
-        [mean, mean - BAND * deviation, mean + BAND * deviation].map(|number| Cell::Number(Some(number)))
-    });
+    let estimates = estimate
+        .iter()
+        .take(coordinates)
+        .enumerate()
+        .flat_map(|(i, (mean, deviation))| {
+            let mean = if i == 0 { mean - turns } else { *mean };
+            [mean, mean - BAND * deviation, mean + BAND * deviation].map(|number| Cell::Number(Some(number)))
+        });
     let last = [
         Cell::Whole(step.reports as i64),
         Cell::Whole(step.rejected as i64),

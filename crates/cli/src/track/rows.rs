@@ -1,12 +1,14 @@
 //! Conversion of rows of a table to instants: what each sensor reported at one time.
 
 use super::applied::Correction;
+use super::late::Late;
 use crate::arguments::{TableOptions, TrackOptions};
 use crate::clock;
 use crate::error::Error;
 use crate::input::Table;
 use crate::say::say;
 use fewbits_record::TimeBase;
+use fewbits_table::Side;
 use std::collections::VecDeque;
 
 /// Times above these are not seconds since 1970 but fractions of a second: the number of them in one second.
@@ -24,6 +26,10 @@ pub(super) struct Kind {
     pub(super) accuracy: Option<String>,
     /// Thresholds of the row's bits.
     pub(super) threshold: Option<String>,
+    /// Whether a sensor that does not report at an instant says something by that.
+    pub(super) is_filled: bool,
+    /// Seconds by which a row may be late.
+    pub(super) late: f64,
 }
 
 impl Kind {
@@ -32,6 +38,8 @@ impl Kind {
             by: options.table.by.clone(),
             accuracy: options.accuracy_column.clone(),
             threshold: options.threshold_column.clone(),
+            is_filled: options.silent_within.is_some(),
+            late: options.late.map_or(0.0, |late| late.as_secs_f64()),
         }
     }
 
@@ -45,6 +53,8 @@ impl Kind {
 pub(super) struct Said {
     pub(super) accuracy: Option<f64>,
     pub(super) threshold: Option<f64>,
+    /// It is a limit, as `<0.25`: the side on which the measurement is.
+    pub(super) limit: Option<Side>,
 }
 
 /// All reports of one time.
@@ -67,6 +77,10 @@ pub(super) struct Instants {
     table: Table,
     base: TimeBase,
     is_long: bool,
+    /// Whether a sensor that does not report at an instant has an empty cell there, though each row is a report.
+    pub(super) is_filled: bool,
+    /// Whether cells may be limits, as `<0.25`.
+    pub(super) has_limits: bool,
     /// Places of the columns that are no sensors: accuracy, threshold.
     own: [Option<usize>; 2],
     /// Seconds of a tick.
@@ -86,6 +100,8 @@ pub(super) struct Instants {
     ahead: VecDeque<Instant>,
     /// The row after an instant that has several rows.
     pending: Option<Instant>,
+    /// Rows that wait for those that are late.
+    late: Late,
 }
 
 impl Instants {
@@ -132,6 +148,7 @@ impl Instants {
         if sensors.is_empty() {
             return Err(Error::empty(table.file(), "columns of values"));
         }
+        let has_limits = table.take_limits();
         table.require_numbers()?;
         let base = table.time_base(&table_options, None)?;
         if table.is_at_end()? {
@@ -144,6 +161,8 @@ impl Instants {
         Ok(Self {
             names: if kind.by.is_some() { Vec::new() } else { sensors },
             is_long: kind.by.is_some(),
+            has_limits,
+            is_filled: kind.is_filled,
             own,
             table,
             base,
@@ -156,6 +175,7 @@ impl Instants {
             before: None,
             ahead: VecDeque::new(),
             pending: None,
+            late: Late::new(kind.late),
         })
     }
 
@@ -219,13 +239,21 @@ impl Instants {
                 }
             }
         }
+        if self.is_long && self.is_filled {
+            for sensor in 0..self.names.len() {
+                if instant.reports.iter().all(|(other, _)| *other != sensor) {
+                    instant.reports.push((sensor, None));
+                    instant.said.push(Said::default());
+                }
+            }
+        }
         Ok(Some(instant))
     }
 
     /// The next row that is not a copy of the one before.
     fn read_row(&mut self) -> Result<Option<Instant>, Error> {
         loop {
-            let row = self.read_any_row()?;
+            let row = self.read_sorted_row()?;
             let is_copy = self.has_time()
                 && row
                     .as_ref()
@@ -236,6 +264,29 @@ impl Instants {
             }
             self.before = row.as_ref().map(|row| (row.seconds, row.reports.clone()));
             return Ok(row);
+        }
+    }
+
+    /// The next row in the order of time, if rows may be late.
+    fn read_sorted_row(&mut self) -> Result<Option<Instant>, Error> {
+        if !self.late.is_waiting() {
+            return self.read_any_row();
+        }
+        loop {
+            if let Some(found) = self.late.pop() {
+                return found.map(Some).map_err(|row| {
+                    let problem = format!(
+                        "row {}: time {} is before that of a row that was used: a longer --late takes it in",
+                        row.row, row.time
+                    );
+                    Error::content(self.file(), problem)
+                });
+            }
+            match self.read_any_row()? {
+                Some(row) => self.late.push(row),
+                None if self.late.end() => return Ok(None),
+                None => {}
+            }
         }
     }
 
@@ -256,19 +307,19 @@ impl Instants {
         // The difference is taken in whole ticks: as nanoseconds since 1970, doubles are 256 apart.
         let seconds = (i128::from(tick) - i128::from(first)) as f64 * self.tick;
         let time = clock::shown(tick, self.base);
-        if seconds < self.last {
+        if seconds < self.last && !self.late.is_waiting() {
             let row = self.table.row();
-            let problem = format!("row {row}: time {time} is before that of the row above: sort the rows by time");
+            let problem = format!(
+                "row {row}: time {time} is before that of the row above: sort the rows by time, or say how late rows may be, as --late 60s (`track`)"
+            );
             return Err(Error::content(self.file(), problem));
         }
         self.last = seconds;
         let own = self
             .own
             .map(|place| cells.get(place?).copied().flatten().filter(|cell| cell.is_finite()));
-        let cells = cells
-            .into_iter()
-            .enumerate()
-            .filter(|(i, _)| !self.own.contains(&Some(*i)));
+        let places: Vec<usize> = (0..cells.len()).filter(|i| !self.own.contains(&Some(*i))).collect();
+        let cells = places.iter().map(|i| (*i, cells[*i]));
         let reports: Reports = if self.is_long {
             let label = self.table.label();
             let known = self.names.iter().position(|name| name == label);
@@ -290,15 +341,16 @@ impl Instants {
                 }
             }
         }
-        let said = Said {
+        let said = |place: &usize| Said {
             accuracy: own[0],
             threshold: own[1],
+            limit: self.table.limit(*place).filter(|_| self.has_limits),
         };
         Ok(Some(Instant {
             seconds,
             time,
             row: self.table.row(),
-            said: vec![said; reports.len()],
+            said: places.iter().map(said).collect(),
             reports,
         }))
     }

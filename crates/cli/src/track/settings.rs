@@ -1,12 +1,13 @@
 //! Settings of the level and its sensors, from options and first rows.
 
 use super::centre::World;
-use super::first::values;
-use super::hints::hints;
+use super::first::{values, values_of};
+use super::hints::{circle, hints};
 use super::meaning::{Meaning, Seat};
+use super::report::Circle;
 use super::rows::{Instant, Instants};
 use super::sensors;
-use crate::arguments::{Switch, TrackOptions};
+use crate::arguments::{Model, Switch, TrackOptions};
 use crate::bounds::PerColumn;
 use crate::error::Error;
 use crate::numbers::{above_zero, mean_and_deviation, number};
@@ -43,6 +44,10 @@ pub(super) struct Settings {
     pub(super) steps: Vec<Option<f64>>,
     /// Whether a model with a slope explains the first rows far better.
     pub(super) has_slope: bool,
+    /// Whether that model is then taken.
+    pub(super) may_slope: bool,
+    /// If the level is an angle, where it is written: about zero if the first rows have negative values.
+    pub(super) circle: Option<Circle>,
     /// What the first rows suggest that no option says.
     pub(super) hints: Vec<String>,
 }
@@ -138,11 +143,21 @@ impl Settings {
             return Err(Error::empty(instants.file(), "rows"));
         }
         let sensors = instants.names.len();
-        if let Some(period) = options.period
-            && !(period > 0.0 && period.is_finite())
-        {
-            return Err(Error::option("--period", &period.to_string(), "a period above 0, as 360"));
-        }
+        let has_negative = (0..sensors).any(|sensor| values_of(&first, sensor).iter().any(|value| *value < 0.0));
+        let mut told = Vec::new();
+        let period = match options.period.as_deref() {
+            Some("no") => None,
+            Some(text) => Some(above_zero("--period", text, "a period above 0, as 360, or `no`")?),
+            None if options.reports => None,
+            None => (0..sensors).find_map(|sensor| {
+                let period = circle(&values_of(&first, sensor))?;
+                let name = &instants.names[sensor];
+                told.push(format!(
+                    "{name} goes around a circle of {period}: it is taken for an angle, as --period {period} says; --period no takes it for a number"
+                ));
+                Some(period)
+            }),
+        };
         let gaps = (0..sensors).map(|sensor| {
             let rows = first.iter().flat_map(|instant| &instant.reports);
             let (all, empty) = rows
@@ -164,15 +179,21 @@ impl Settings {
         let mut settings = Self {
             steps: Vec::new(),
             has_slope: false,
-            hints: Vec::new(),
+            hints: told,
+            may_slope: options.model.is_none(),
+            circle: period.map(|period| Circle {
+                period,
+                low: if has_negative { -0.5 * period } else { 0.0 },
+            }),
             meaning: Meaning {
                 step: asked_step,
                 silent_within: within,
                 limits: options.limits.as_deref().map_or(Ok((None, None)), limits)?,
                 has_accuracy: options.accuracy_column.is_some(),
+                has_limits: instants.has_limits,
             },
             world: World {
-                model: options.model,
+                model: options.model.unwrap_or(Model::Walk),
                 change: 0.0,
                 within: 1.0,
                 prior: (0.0, 0.0),
@@ -181,7 +202,7 @@ impl Settings {
                     .as_deref()
                     .map(|text| mean_and_deviation("--slope", text))
                     .transpose()?,
-                period: options.period,
+                period,
                 sensors,
                 steepest: 0.0,
                 is_smoothed: options.smooth.is_some(),
@@ -196,9 +217,9 @@ impl Settings {
             sends,
             thresholds,
             losses: gaps.collect(),
-            offsets: options.align.map_or(Vec::new(), |rows| {
-                offsets(&values(&first[..rows.min(first.len())], &[]), sensors, options.period)
-            }),
+            offsets: options
+                .align
+                .map_or(Vec::new(), |rows| offsets(&values(&first[..rows.min(first.len())], &[]), sensors, period)),
         };
         if settings.world.interval <= 0.0 {
             settings.world.interval = 1.0;
@@ -249,7 +270,8 @@ impl Settings {
             .map(|(sensor, name)| settings.seat(sensor, name).noise)
             .collect();
         let apart = (noises.as_slice(), settings.offsets.as_slice());
-        settings.hints = hints(options, &first, &instants.names, apart, settings.has_slope);
+        let found = hints(options, &first, &instants.names, apart, settings.has_slope);
+        settings.hints.extend(found);
         Ok(settings)
     }
 

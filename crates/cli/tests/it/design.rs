@@ -92,3 +92,23 @@ fn refusals_of_design() {
     let message = refused(folder.path(), &["design", "-", "--noise", "1"], b"a\n");
     assert!(message.contains("no numbers in the column"), "{message}");
 }
+
+/// Noise 0 was refused. The thresholds of a normal unknown without noise are those of Max (1960); points of mass are parted in the middle.
+#[test]
+fn a_sensor_without_noise_is_designed() {
+    let folder = tempfile::tempdir().unwrap();
+    let json = |words: &[&str], input: &str| -> serde_json::Value {
+        serde_json::from_str(&text(&good(folder.path(), words, input.as_bytes()))).unwrap()
+    };
+    let design = json(&["design", "--prior", "3±2", "--noise", "0", "--bits", "2", "--json"], "");
+    let edges = design["sensors"][0]["breakpoints"].as_array().unwrap();
+    for (edge, expected) in edges.iter().zip([3.0 - 2.0 * 0.9816, 3.0, 3.0 + 2.0 * 0.9816]) {
+        assert!((edge.as_f64().unwrap() - expected).abs() < 2e-3, "{design}");
+    }
+    let sample = "y\n".to_owned() + &"0\n0.3\n0.6\n1\n".repeat(50);
+    let design = json(&["design", "-", "--noise", "0", "--bits", "2", "--json"], &sample);
+    let edges = design["sensors"][0]["breakpoints"].as_array().unwrap();
+    for (edge, expected) in edges.iter().zip([0.15, 0.45, 0.8]) {
+        assert!((edge.as_f64().unwrap() - expected).abs() < 0.01, "{design}");
+    }
+}

@@ -24,6 +24,7 @@ mod streams;
 mod tables;
 mod track;
 mod track_faults;
+mod track_found;
 mod track_meanings;
 mod track_random;
 

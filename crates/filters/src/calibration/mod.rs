@@ -33,6 +33,9 @@ const FAR_BELOW: f64 = 2.0;
 const AS_HIGH: f64 = 0.2;
 const RAISED: f64 = 0.25;
 const LITTLE: f64 = 1.0;
+/// Steps of the mean over a number, in `ln`, and how many to either side.
+const SETTLED: f64 = 0.125;
+const FAR: i32 = 16;
 /// A sensor with fewer values than this has the noise that all have together.
 const FEWEST: usize = 12;
 
@@ -189,9 +192,8 @@ where
                 break;
             }
         }
-        // What may as well be zero would make bands of no width: then the largest that is not improbable.
         for axis in together.iter().chain(change.is_unknown().then_some(&0)) {
-            found.raise(*axis);
+            found.settle(*axis);
         }
         let number = |number: &Number, shift: f64| number.at(shift).unwrap_or(number.start());
         Ok(Calibration {
@@ -279,8 +281,10 @@ impl<L: Fn(f64, &[f64]) -> f64> Search<'_, L> {
         }
     }
 
-    /// Raises a number of which the likelihood is as high far below as far as it loses little.
-    fn raise(&mut self, axis: usize) {
+    /// Replaces a number by the root of the mean of its square under its likelihood, the other numbers held: what may as well be smaller or larger
+    /// makes bands too narrow more than too wide. Where the likelihood is as high far below, it says nothing but an upper end, and the largest number
+    /// that is not improbable is taken.
+    fn settle(&mut self, axis: usize) {
         let moved = |by: f64| {
             let mut other = self.shifts.clone();
             other[axis] += by;
@@ -297,11 +301,25 @@ impl<L: Fn(f64, &[f64]) -> f64> Search<'_, L> {
             _ => FAR_BELOW,
         };
         let down = FAR_BELOW.min(room);
-        if down < RAISED || self.at(&moved(-down)) < self.best - AS_HIGH * down / FAR_BELOW {
+        let here = self.at(&self.shifts);
+        // At the least number it is as small as it may be.
+        let is_flat = down < RAISED || self.at(&moved(-down)) >= here - AS_HIGH * down / FAR_BELOW;
+        if !is_flat {
+            let (mut sum, mut squares) = (0.0, 0.0);
+            for k in -FAR..=FAR {
+                let by = SETTLED * f64::from(k);
+                let weight = (self.at(&moved(by)) - here).exp();
+                sum += weight;
+                squares += weight * (2.0 * by).exp();
+            }
+            let by = 0.5 * (squares / sum).ln();
+            if by.is_finite() && self.at(&moved(by)).is_finite() {
+                self.shifts[axis] += by;
+            }
             return;
         }
         let mut by = 0.0;
-        while by < REACH && self.at(&moved(by + RAISED)) > self.best - LITTLE {
+        while by < REACH && self.at(&moved(by + RAISED)) > here - LITTLE {
             by += RAISED;
         }
         // What no reading depends on stays as it is.

@@ -80,7 +80,12 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     }
 
     /// Updates a belief with the stored slots of one instant that were used. If they are impossible now, none of their reports is used.
-    fn replay(&mut self, rng: &mut dyn Rng, belief: &mut F::Belief, slots: &mut [StoredSlot]) -> Result<(), Error> {
+    pub(super) fn replay(
+        &mut self,
+        rng: &mut dyn Rng,
+        belief: &mut F::Belief,
+        slots: &mut [StoredSlot],
+    ) -> Result<(), Error> {
         let (mut reports, mut contested, mut missing) = (Vec::new(), Vec::new(), Vec::new());
         for slot in slots.iter() {
             // A sensor may have left in the meantime.

@@ -37,6 +37,7 @@ mod receive;
 mod remote;
 mod slot;
 mod state;
+mod window;
 
 pub use health::{FalseAlarms, Health};
 pub use learning::NoiseLearning;

@@ -149,6 +149,9 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
     if request.walk {
         problem.try_walks(relative_to, &mut refused);
     }
+    if request.slope {
+        problem.try_without_slopes(&mut refused);
+    }
     let estimates = problem.errors(&mut refused);
     let (log_likelihood, residuals) = problem.model.log_likelihood(instants)?;
     let tests = tests_of_fit::of(&residuals);

@@ -6,8 +6,15 @@ use super::search::{information, maximum};
 use crate::calibration::{Instant, median};
 use nalgebra::{DMatrix, DVector};
 
-/// A walk, and a time constant, is kept if it raises the likelihood by so many nats.
+/// A time constant, a walk or a drift is kept if it raises the likelihood by so many nats: one in twenty tests of a parameter that is zero does.
+/// A walk cannot be negative, so half of that is as much evidence.
 const WORTH: f64 = 2.0;
+const WORTH_OF_WALK: f64 = 1.35;
+/// Deviation of the logarithm of a change or a noise about the first guess: nothing may be taken for zero only because the readings do not
+/// tell it from zero.
+const VAGUE: f64 = 2.0;
+/// Starts from which the search climbs.
+const CLIMBS: usize = 3;
 /// Standard errors above these say that a parameter is not determined: of logarithms, and in units of the search.
 const UNDETERMINED_LOG: f64 = 2.0;
 const UNDETERMINED: f64 = 30.0;
@@ -19,6 +26,8 @@ pub(super) struct Problem<'a> {
     instants: &'a [Instant],
     scale: Scale,
     pub(super) model: LevelModel,
+    /// The first guess.
+    guess: LevelModel,
     free: Vec<Quantity>,
     /// Seconds of all readings, and between two.
     length: f64,
@@ -38,6 +47,7 @@ impl<'a> Problem<'a> {
         Self {
             instants,
             scale,
+            guess: model.clone(),
             model,
             free,
             length: if length > 0.0 { length } else { 1.0 },
@@ -101,40 +111,91 @@ impl<'a> Problem<'a> {
         found.unwrap_or(f64::NEG_INFINITY)
     }
 
-    /// Climbs from several changes and, where they are asked for, delays.
+    /// The likelihood, less what changes and noises far from the first guess cost.
+    fn worth(&self, model: &LevelModel) -> f64 {
+        let far = |quantity: &Quantity| {
+            let pair = match *quantity {
+                Quantity::Change => (model.change, self.guess.change),
+                Quantity::Noise(sensor) => (model.sensors[sensor].noise, self.guess.sensors[sensor].noise),
+                _ => return 0.0,
+            };
+            0.5 * ((pair.0 / pair.1).ln() / VAGUE).powi(2)
+        };
+        self.log_likelihood(model) - self.free.iter().map(far).sum::<f64>()
+    }
+
+    /// Climbs from several changes, each with the delays that fit best.
     pub(super) fn solve(&mut self) {
         let change = self.model.change;
-        let by_change = [1e-2, 0.1, 1.0, 10.0].map(|factor| LevelModel {
-            change: factor * change,
-            ..self.model.clone()
-        });
-        self.take_best(by_change.into_iter());
-        for quantity in self.free.clone() {
-            if let Quantity::Delay(sensor) = quantity {
-                let with = |half: i32| {
-                    let mut model = self.model.clone();
-                    model.sensors[sensor].delay = 0.5 * f64::from(half) * self.interval;
-                    model
+        let mut starts: Vec<(f64, LevelModel)> = [1e-2, 0.1, 1.0, 3.0, 10.0]
+            .map(|factor| {
+                let model = LevelModel {
+                    change: factor * change,
+                    ..self.model.clone()
                 };
-                let all: Vec<LevelModel> = (-DELAYS..=DELAYS).map(with).collect();
-                self.take_best(all.into_iter());
+                self.with_best_delays(model, -DELAYS..=DELAYS, 0.5)
+            })
+            .into_iter()
+            .collect();
+        starts.sort_by(|one, other| other.0.total_cmp(&one.0));
+        starts.truncate(CLIMBS);
+        let mut best: Option<(f64, LevelModel)> = None;
+        for (_, start) in starts {
+            self.model = start;
+            // Units follow the noises, so the second climb begins in better ones.
+            self.climb();
+            let mut found = self.climb();
+            if self.free.iter().any(|one| matches!(one, Quantity::Delay(_))) {
+                // The likelihood has kinks in a delay, at which a climb may end.
+                let (finer, model) = self.with_best_delays(self.model.clone(), -DELAYS..=DELAYS, 0.125);
+                if finer > found {
+                    self.model = model;
+                    found = self.climb();
+                }
+            }
+            if best.as_ref().is_none_or(|(most, _)| found > *most) {
+                best = Some((found, self.model.clone()));
             }
         }
-        // Units follow the noises, so the second climb begins in better ones.
-        for _ in 0..2 {
-            self.climb();
+        if let Some((_, model)) = best {
+            self.model = model;
         }
     }
 
+    /// A model with the best of several delays about its own, one sensor after the other.
+    fn with_best_delays(
+        &self,
+        model: LevelModel,
+        range: std::ops::RangeInclusive<i32>,
+        step: f64,
+    ) -> (f64, LevelModel) {
+        let mut best = (self.worth(&model), model);
+        for quantity in &self.free {
+            let Quantity::Delay(sensor) = *quantity else {
+                continue;
+            };
+            let middle = best.1.clone();
+            for steps in range.clone() {
+                let mut model = middle.clone();
+                model.sensors[sensor].delay += step * f64::from(steps) * self.interval;
+                let found = self.worth(&model);
+                if found > best.0 {
+                    best = (found, model);
+                }
+            }
+        }
+        best
+    }
+
     fn take_best(&mut self, models: impl Iterator<Item = LevelModel>) {
-        let scored = models.map(|model| (self.log_likelihood(&model), model));
+        let scored = models.map(|model| (self.worth(&model), model));
         if let Some((_, best)) = scored.max_by(|one, other| one.0.total_cmp(&other.0)) {
             self.model = best;
         }
     }
 
     fn climb(&mut self) -> f64 {
-        let (point, best) = maximum(|point| self.log_likelihood(&self.at(point)), DVector::zeros(self.free.len()));
+        let (point, best) = maximum(|point| self.worth(&self.at(point)), DVector::zeros(self.free.len()));
         self.model = self.at(&point);
         best
     }
@@ -142,7 +203,7 @@ impl<'a> Problem<'a> {
     /// Whether the level returns to its mean.
     pub(super) fn try_time_constant(&mut self, refused: &mut Vec<Refusal>) {
         let (before, free) = (self.model.clone(), self.free.clone());
-        let wandering = self.log_likelihood(&before);
+        let wandering = self.worth(&before);
         self.free.extend([Quantity::TimeConstant, Quantity::Mean]);
         let returning = [0.01, 0.03, 0.1, 0.3].map(|share| LevelModel {
             time_constant: Some(share * self.length),
@@ -160,14 +221,14 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Which offsets wander.
+    /// Which offsets wander, and which of them drift beside: a drift that is not certain would be extended beyond the readings.
     pub(super) fn try_walks(&mut self, anchor: usize, refused: &mut Vec<Refusal>) {
         for sensor in (0..self.model.sensors.len()).filter(|sensor| *sensor != anchor) {
             if !self.free.contains(&Quantity::Bias(sensor)) {
                 continue;
             }
             let (before, free) = (self.model.clone(), self.free.clone());
-            let steady = self.log_likelihood(&before);
+            let steady = self.worth(&before);
             let whole = before.sensors[sensor].noise / self.length.sqrt();
             self.free.push(Quantity::Walk(sensor));
             let wandering = [0.5, 2.0, 8.0].map(|factor| {
@@ -176,11 +237,36 @@ impl<'a> Problem<'a> {
                 model
             });
             self.take_best(wandering.into_iter());
-            if self.climb() < steady + WORTH {
+            if self.climb() < steady + WORTH_OF_WALK {
                 (self.model, self.free) = (before, free);
                 refused.push(Refusal {
                     quantity: Quantity::Walk(sensor),
                     reason: "an offset that does not wander explains the readings as well".to_owned(),
+                });
+            }
+        }
+    }
+
+    /// Leaves out the drifts without which the readings are explained as well.
+    pub(super) fn try_without_slopes(&mut self, refused: &mut Vec<Refusal>) {
+        for sensor in 0..self.model.sensors.len() {
+            let slope = Quantity::Slope(sensor);
+            if !self.free.contains(&slope) {
+                continue;
+            }
+            let (before, free) = (self.model.clone(), self.free.clone());
+            let drifting = self.worth(&before);
+            self.free.retain(|quantity| *quantity != slope);
+            // The offset in the middle of the readings stays.
+            let model = &mut self.model.sensors[sensor];
+            model.bias += 0.5 * model.slope * self.length;
+            model.slope = 0.0;
+            if self.climb() + WORTH < drifting {
+                (self.model, self.free) = (before, free);
+            } else {
+                refused.push(Refusal {
+                    quantity: slope,
+                    reason: "an offset that does not drift explains the readings as well".to_owned(),
                 });
             }
         }

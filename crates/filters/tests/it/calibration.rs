@@ -220,3 +220,13 @@ fn offsets_have_no_part_in_common() {
     let found = offsets(&recorded(7, 0.05, &[0.5; 2], &[0.0, 2.0], 200), 2, None);
     assert!((found[0] + 1.0).abs() < 0.1 && (found[1] - 1.0).abs() < 0.1, "{found:?}");
 }
+
+/// Defect: a noise that began at the smallest number considered stayed there, though far larger ones explain the values as well: bands of no
+/// width.
+#[test]
+fn a_noise_that_may_as_well_be_larger_is_not_left_at_the_least() {
+    let instants = recorded(11, 1.0, &[0.01], &[], 200);
+    let least = 1e-5;
+    let calibration = found(&instants, &[Number::Unknown { guess: least, least }]);
+    assert!(calibration.noises[0] > 1e-3, "{calibration:?}");
+}

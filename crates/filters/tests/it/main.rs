@@ -22,6 +22,7 @@ mod stored;
 mod tangent;
 mod unchanged;
 mod wild;
+mod window;
 mod words;
 
 use fewbits_core::Likelihood;

@@ -20,7 +20,7 @@ const LEFT_OUT: f64 = 1e-6;
 const SCORE_KEPT: f64 = 0.9;
 /// Share of a range's evidence that stays in the recent evidence, and by how many nats that of two hypotheses may differ without deciding.
 const RECALLED: f64 = 0.98;
-const UNDECIDED: f64 = 6.0;
+const UNDECIDED: f64 = 20.0;
 /// One explanation of all ranges so far.
 #[derive(Debug)]
 pub(super) struct Hypothesis {

@@ -15,16 +15,19 @@
 
 mod acquisition;
 mod arrived;
+mod asked;
 mod bank;
 mod estimate;
 mod fit;
 mod gaussian;
+mod heights;
 mod odds;
 mod rows;
 mod search;
 mod settings;
 
 pub use estimate::RangeEstimate;
+pub use heights::height_of;
 pub use settings::{Height, RangeSettings};
 
 use crate::Error;
@@ -81,6 +84,8 @@ pub struct RangeTracker {
     pushed: usize,
     bits: usize,
     losses: usize,
+    /// `ln` of the evidence that was taken off the hypotheses' weights.
+    evidence: f64,
 }
 
 impl RangeTracker {
@@ -125,43 +130,8 @@ impl RangeTracker {
             pushed: 0,
             bits: 0,
             losses: 0,
+            evidence: 0.0,
         })
-    }
-
-    /// Total bits of all ranges so far.
-    pub fn bits(&self) -> usize {
-        self.bits
-    }
-
-    /// Number of times that the track was lost.
-    pub fn losses(&self) -> usize {
-        self.losses
-    }
-
-    /// Number of estimated coordinates of the position: 2, or 3 with the height.
-    pub fn coordinates(&self) -> usize {
-        self.known.axes
-    }
-
-    /// Number of anchors whose ranges are needed at once before there is a place.
-    pub fn needed(&self) -> usize {
-        (self.known.axes + 2).min(self.places.len())
-    }
-
-    /// The probability that an anchor's ranges depend on its distance. One half or less: it contradicts the others. 1 before a place is found.
-    ///
-    /// # Errors
-    /// If there is no such anchor.
-    pub fn works(&self, anchor: &str) -> Result<f64, Error> {
-        let number = self.number(anchor)?;
-        let shares = self.shares();
-        let sum: f64 = self
-            .hypotheses
-            .iter()
-            .zip(&shares)
-            .map(|(one, share)| share * one.good[number])
-            .sum();
-        Ok(if self.hypotheses.is_empty() { 1.0 } else { sum })
     }
 
     fn number(&self, anchor: &str) -> Result<usize, Error> {
@@ -198,7 +168,10 @@ impl RangeTracker {
         let mut next = std::mem::take(&mut self.next);
         next.clone_from(&self.hypotheses);
         let lost = match self.track(&mut next, if is_new { elapsed } else { 0.0 }, is_new, anchor, range) {
-            Ok(()) => is_lost(&next, self.travel != Travel::Full),
+            Ok(taken) => {
+                self.evidence += taken;
+                is_lost(&next, self.travel != Travel::Full)
+            }
             // The range has probability zero under every hypothesis, even as an outlier.
             Err(Error::Impossible) => true,
             Err(error) => return Err(error),
@@ -237,8 +210,9 @@ impl RangeTracker {
             self.collected.clear();
             if !self.hypotheses.is_empty() {
                 let mut next = self.hypotheses.clone();
-                if self.track(&mut next, time - self.last, true, anchor, range).is_ok() {
+                if let Ok(taken) = self.track(&mut next, time - self.last, true, anchor, range) {
                     self.hypotheses = next;
+                    self.evidence += taken;
                 }
                 return;
             }
@@ -269,11 +243,11 @@ impl RangeTracker {
         self.hypotheses = hypotheses(&self.known, self.places.len(), self.calibration, &rows);
         self.tried = 0;
         let mut found = std::mem::take(&mut self.hypotheses);
-        drop_improbable(&mut found);
+        self.evidence = drop_improbable(&mut found);
         self.hypotheses = found;
     }
 
-    /// Moves hypotheses on and updates them with a range.
+    /// Moves hypotheses on and updates them with a range. Returns `ln` of the evidence that was taken off their weights.
     fn track(
         &self,
         next: &mut Vec<Hypothesis>,
@@ -281,7 +255,7 @@ impl RangeTracker {
         is_new: bool,
         anchor: usize,
         range: f64,
-    ) -> Result<(), Error> {
+    ) -> Result<f64, Error> {
         let (known, place) = (&self.known, &self.places[anchor]);
         let step = Step::over(elapsed, known.persistence, known.drift);
         let shares = shares_of(next);
@@ -352,11 +326,11 @@ impl RangeTracker {
         if next.is_empty() {
             return Err(failed.unwrap_or(Error::Impossible));
         }
-        drop_improbable(next);
+        let taken = drop_improbable(next);
         if self.pushed.is_multiple_of(COMPARED) {
             merge_same(next);
         }
-        Ok(())
+        Ok(taken)
     }
 
     fn shares(&self) -> Vec<f64> {

@@ -28,15 +28,18 @@ pub(super) fn shares_of(hypotheses: &[Hypothesis]) -> Vec<f64> {
     weights.iter().map(|weight| weight / total).collect()
 }
 
-/// Drops hypotheses that are improbable beside the best one.
-pub(super) fn drop_improbable(hypotheses: &mut Vec<Hypothesis>) {
+/// Drops hypotheses that are improbable beside the best one. Returns what was taken off the `ln` of all weights: only differences matter.
+pub(super) fn drop_improbable(hypotheses: &mut Vec<Hypothesis>) -> f64 {
     let best = hypotheses
         .iter()
         .map(Hypothesis::log_share)
         .fold(f64::NEG_INFINITY, f64::max);
     hypotheses.retain(|one| one.log_share() - best > DROPPED.ln());
-    // Only differences matter.
+    if !best.is_finite() {
+        return 0.0;
+    }
     hypotheses.iter_mut().for_each(|one| one.log_weight -= best);
+    best
 }
 
 /// Of hypotheses about the same place with the same model, keeps the most probable, with the probability of all.

@@ -5,6 +5,7 @@
 mod dialects;
 mod faults;
 mod kinds;
+mod limits;
 mod loggers;
 mod long;
 #[cfg(feature = "parquet")]

@@ -1,0 +1,90 @@
+//! The height of the target, if nobody says it: the ranges tell it, if they are many and the anchors stand well.
+
+use super::{Height, RangeSettings, RangeTracker, Travel};
+use crate::Error;
+use nalgebra::Vector3;
+
+/// Differences of height that are tried where the anchors' table says no heights, in spreads of the anchors.
+const TRIED: [f64; 6] = [0.0, 0.1, 0.2, 0.3, 0.45, 0.7];
+/// A difference must explain the ranges better than none by so many nats.
+const BETTER: f64 = 10.0;
+/// Where the anchors have heights: number of heights that are tried, from below the lowest anchor to above the highest by this share of the spread.
+const HEIGHTS: usize = 9;
+const BEYOND: f64 = 0.5;
+/// Heights that are no neighbours must differ by so many nats: anchors of like heights leave two sides.
+const APART: f64 = 6.0;
+/// Halvings of the step between two heights, about the best one.
+const HALVINGS: usize = 3;
+/// Ranges from which it is found, at most, and at least for each anchor.
+const RANGES: usize = 400;
+const FEWEST: usize = 8;
+
+/// The constant height of the target, from its first ranges: each height that is tried is a tracker, and their evidences decide. `ranges`: time in
+/// seconds, anchor and range. If all anchors have the height 0, it is the difference to them, above or below, and only returned if the ranges say that
+/// there is one. `None` if the ranges do not tell it, if it is stated or the clock unknown, if there are fewer than four anchors or eight ranges of
+/// each, or if a tracker loses the track.
+///
+/// # Errors
+/// As [`RangeTracker::new`] and [`RangeTracker::push`].
+pub fn height_of(
+    anchors: &[(String, Vector3<f64>)],
+    settings: RangeSettings,
+    ranges: &[(f64, &str, f64)],
+) -> Result<Option<f64>, Error> {
+    let is_asked = settings.height == Height::Unsaid && !settings.unknown_clock;
+    if !is_asked || anchors.len() < 4 || ranges.len() < FEWEST * anchors.len() {
+        return Ok(None);
+    }
+    let ranges = &ranges[..ranges.len().min(RANGES)];
+    let evidence = |height: f64| -> Result<f64, Error> {
+        let settings = RangeSettings {
+            height: Height::Known(height),
+            ..settings
+        };
+        let mut tracker = RangeTracker::new(anchors.iter().cloned(), Travel::Full, settings)?;
+        for (time, anchor, range) in ranges {
+            tracker.push(*time, anchor, *range)?;
+        }
+        let found = tracker.log_evidence().filter(|_| tracker.losses() == 0);
+        Ok(found.unwrap_or(f64::NEG_INFINITY))
+    };
+    let count = anchors.len() as f64;
+    let middle = anchors.iter().map(|(_, place)| place).sum::<Vector3<f64>>() / count;
+    let squares: f64 = anchors.iter().map(|(_, place)| (place - middle).norm_squared()).sum();
+    let spread = (squares / count).sqrt();
+    let is_flat = anchors.iter().all(|(_, place)| place.z == 0.0);
+    let tried: Vec<f64> = if is_flat {
+        TRIED.map(|share| share * spread).to_vec()
+    } else {
+        let heights = || anchors.iter().map(|(_, place)| place.z);
+        let low = heights().fold(f64::INFINITY, f64::min) - BEYOND * spread;
+        let high = heights().fold(f64::NEG_INFINITY, f64::max) + BEYOND * spread;
+        let step = (high - low) / (HEIGHTS - 1) as f64;
+        (0..HEIGHTS).map(|k| low + step * k as f64).collect()
+    };
+    let found: Vec<f64> = tried.iter().map(|height| evidence(*height)).collect::<Result<_, _>>()?;
+    let Some(best) = (0..found.len()).max_by(|one, other| found[*one].total_cmp(&found[*other])) else {
+        return Ok(None);
+    };
+    let is_told = if is_flat {
+        best > 0 && found[0].is_finite() && found[best] > found[0] + BETTER
+    } else {
+        let is_beaten = |k: usize| k.abs_diff(best) < 2 || found[k] < found[best] - APART;
+        best > 0 && best + 1 < found.len() && (0..found.len()).all(is_beaten)
+    };
+    if !is_told || !found[best].is_finite() {
+        return Ok(None);
+    }
+    let (mut height, mut most) = (tried[best], found[best]);
+    let mut step = tried[best] - tried[best - 1];
+    for _ in 0..HALVINGS {
+        step *= 0.5;
+        for other in [height - step, height + step] {
+            let found = evidence(other)?;
+            if found > most {
+                (height, most) = (other, found);
+            }
+        }
+    }
+    Ok(Some(height))
+}
