@@ -12,7 +12,7 @@ from scipy.special import log_ndtr, ndtr  # noqa: F401  (for the modules)
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 VALUES = os.path.join(HERE, "..", "crates", "experiments", "references")
-SYSTEMS = ("dymbo", "mi", "binary", "assign", "cfwmd", "mpa", "handoff", "diffusive", "problems")
+SYSTEMS = ("dymbo", "mi", "binary", "assign", "cfwmd", "mpa", "handoff", "diffusive", "problems", "targets")
 
 
 def committed(system):

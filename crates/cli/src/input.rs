@@ -88,6 +88,11 @@ impl Table {
         &self.file
     }
 
+    /// Whether rows may come one by one, as from a pipe: what is made of a row must not wait for the next.
+    pub(crate) fn is_live(&self) -> bool {
+        self.limit == 1
+    }
+
     /// Number of the last row read, counted from 1 after the line of names.
     pub(crate) fn row(&self) -> u64 {
         self.row

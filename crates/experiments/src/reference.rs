@@ -49,7 +49,8 @@ systems![
     "handoff",
     "mi",
     "mpa",
-    "problems"
+    "problems",
+    "targets"
 ];
 
 fn of(key: &str) -> Result<&'static [Reference], String> {

@@ -226,11 +226,16 @@ impl Configuration {
             let Some(entry) = faults.keep(&name, entry.try_into::<Entry>()) else {
                 continue;
             };
+            check_entry(&name, &entry, model.map(Model::coordinates), faults);
             let Some(numbers) = faults.keep(&name, numbers(&entry)) else {
                 continue;
             };
             for number in numbers.into_iter().filter(|number| !revoked.contains(number)) {
-                sensors.extend(faults.keep(&format!("sensor {number}"), sensor(&entry, number, fleet.as_ref())));
+                // What the key of one of a group lacks, all lack.
+                let Some(key) = faults.keep(&format!("sensor {number}"), key(&entry, number, fleet.as_ref())) else {
+                    break;
+                };
+                sensors.push(Sensor::of(&entry, number, key));
             }
         }
         if sensors.is_empty() && faults.0.is_empty() {
@@ -299,28 +304,42 @@ fn numbers(entry: &Entry) -> Result<Vec<u32>, String> {
     Ok(all)
 }
 
-fn sensor(entry: &Entry, number: u32, fleet: Option<&FleetKey>) -> Result<Sensor, Error> {
-    let key = match (&entry.key, fleet) {
-        (Some(key), _) => Key::from_hex(key)?,
-        (None, Some(fleet)) => fleet.key_of(number, entry.key_version)?,
-        (None, None) => return Err(Error::content("key", "expected `key`, or `fleet_key_file` for all sensors")),
-    };
-    let fault = |problem: String| Err(Error::content("sensor", problem));
+/// The numbers of an entry, whether it stands for one sensor or many.
+fn check_entry(name: &str, entry: &Entry, coordinates: Option<usize>, faults: &mut Faults) {
     if !(entry.deviation.is_finite() && entry.deviation > 0.0) {
-        return fault(format!("deviation is {}: expected above 0", entry.deviation));
+        faults.add(format_args!("{name}: deviation is {}: expected above 0", entry.deviation));
     }
     if !(0.0..1.0).contains(&entry.loss) {
-        return fault(format!("loss is {}: expected 0 or more, below 1", entry.loss));
+        faults.add(format_args!("{name}: loss is {}: expected 0 or more, below 1", entry.loss));
     }
-    Ok(Sensor {
-        number,
-        key,
-        address: entry.address.clone(),
-        reads: entry.reads,
-        deviation: entry.deviation,
-        report: entry.report,
-        loss: entry.loss,
-    })
+    if let Some(coordinates) = coordinates.filter(|coordinates| entry.reads >= *coordinates) {
+        faults.add(format_args!(
+            "{name}: reads is {}: expected below {coordinates}, the coordinates of the model",
+            entry.reads
+        ));
+    }
+}
+
+fn key(entry: &Entry, number: u32, fleet: Option<&FleetKey>) -> Result<Key, Error> {
+    match (&entry.key, fleet) {
+        (Some(key), _) => Ok(Key::from_hex(key)?),
+        (None, Some(fleet)) => Ok(fleet.key_of(number, entry.key_version)?),
+        (None, None) => Err(Error::content("key", "expected `key`, or `fleet_key_file` for all sensors")),
+    }
+}
+
+impl Sensor {
+    fn of(entry: &Entry, number: u32, key: Key) -> Self {
+        Self {
+            number,
+            key,
+            address: entry.address.clone(),
+            reads: entry.reads,
+            deviation: entry.deviation,
+            report: entry.report,
+            loss: entry.loss,
+        }
+    }
 }
 
 fn check_sensors(sensors: &[Sensor], faults: &mut Faults) {

@@ -293,6 +293,9 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
             waiting.push((first, step, events));
         } else {
             sheet.write(cells(shown, first, &step.estimate, &step, events))?;
+            if instants.is_live() {
+                sheet.flush()?;
+            }
         }
     }
     if let Some(lag) = lag {

@@ -265,6 +265,9 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
         let first = first_cell(&instants, instant.time);
         let last = [Cell::Whole(ranges as i64), Cell::Text(events.to_owned())];
         sheet.write(std::iter::once(first).chain(cells(found.as_ref(), axes)).chain(last))?;
+        if instants.is_live() {
+            sheet.flush()?;
+        }
     }
     sheet.finish()?;
     (summary.bits, summary.losses) = (tracker.bits(), tracker.losses());

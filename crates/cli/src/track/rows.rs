@@ -189,6 +189,11 @@ impl Instants {
         self.table.file()
     }
 
+    /// Whether rows may come one by one: [`Table::is_live`].
+    pub(super) fn is_live(&self) -> bool {
+        self.table.is_live()
+    }
+
     /// Whether rows have times.
     pub(super) fn has_time(&self) -> bool {
         self.base != TimeBase::Numbered

@@ -285,6 +285,27 @@ fn all_faults_are_named_at_once_and_no_key_is_shown() {
     // One fault of a sensor hides none of another.
     let (_, said) = checked(&good.replace("loss = 0.1", "loss = 1").replace(&key('b'), &key('a')));
     assert!(said.contains("sensor 1: ") && said.contains("sensor 2: ") && said.contains("loss is 1"), "{said}");
+    // Nor another of its own.
+    let bad = good
+        .replace("deviation = 0.5", "deviation = -0.5\nreads = 3")
+        .replace("loss = 0.1", "loss = 1")
+        .replace(&key('b'), &key('a'));
+    let (_, said) = checked(&bad);
+    for fault in [
+        "sensor 1: deviation is -0.5",
+        "sensor 1: loss is 1",
+        "sensor 1: reads is 3",
+        "sensor 2: loss is 1",
+        "sensor 2: its key is that of sensor 1",
+    ] {
+        assert!(said.contains(fault), "{fault} is not in {said}");
+    }
+    // A group has its fault once.
+    let group =
+        good.replace("number = 2", "numbers = \"2-9\"")
+            .replacen(&format!("key = \"{}\"", key('b')), "loss = 2", 1);
+    let (_, said) = checked(&group.replacen("report = { kind = \"sign\" }\nloss = 0.1", "report = \"bit\"", 1));
+    assert_eq!((said.matches("loss is 2").count(), said.matches("fleet_key_file").count()), (1, 1), "{said}");
     let (_, said) = checked(&good.replace(&key('b'), &key('a')));
     assert!(said.contains("sensor 2: its key is that of sensor 1"), "{said}");
     // What is no TOML is named by its line, without the line.

@@ -1,6 +1,6 @@
 //! Live sources: what was read before an error or a signal is kept.
 
-use crate::{BOUND, fewbits, folder, good, start, table, text, wait_for};
+use crate::{BOUND, fewbits, first_lines, folder, good, start, table, text, wait_for};
 use std::io::Write;
 use std::path::Path;
 use std::time::Duration;
@@ -219,5 +219,31 @@ fn named_pipe_is_read_once() {
         let feeder = feed(bytes.clone());
         good(&folder, words, b"");
         feeder.join().unwrap();
+    }
+}
+
+/// Defect: estimates of a pipe waited until some hundreds of them were there, or the pipe ended.
+#[test]
+fn estimates_follow_a_pipe() {
+    let (_kept, folder) = folder();
+    let places = "anchor,x,y\nP,0,0\nQ,10,0\nR,0,10\n";
+    std::fs::write(folder.join("anchors.csv"), places).unwrap();
+    let level = vec!["track", "-", "--prior", "0±10", "--noise", "0.5", "--change", "0.1"];
+    let place = vec!["ranges", "-", "--anchors", "anchors.csv", "--noise", "0.5"];
+    let json = [&level[..], &["--json"]].concat();
+    for (words, is_level, names) in [(level, true, 1), (json, true, 0), (place, false, 1)] {
+        let mut child = start(&folder, &words);
+        let mut stdin = child.stdin.take().unwrap();
+        let row = |k: usize| match is_level {
+            true => format!("{k},{}.5\n", k % 3),
+            false => format!("{k},5.{k},7.1,7.{k}\n"),
+        };
+        let head = if is_level { "time,a\n" } else { "time,P,Q,R\n" };
+        stdin.write_all(head.as_bytes()).unwrap();
+        (0..3).for_each(|k| stdin.write_all(row(k).as_bytes()).unwrap());
+        // The pipe is still open.
+        let lines = first_lines(child, names + 3);
+        assert_eq!(lines.len(), names + 3, "{words:?}: {lines:?}");
+        drop(stdin);
     }
 }

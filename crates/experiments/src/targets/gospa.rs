@@ -7,11 +7,13 @@ use fewbits_multi_target::{Gospa, Report, Tracks, gospa};
 
 /// Distance beyond which an estimate is of no target.
 const CUTOFF: f64 = 20.0;
+/// Deviation of a range, with which the references were computed.
+const NOISE: f64 = 6.0;
 
 parameters! {
     pub struct Parameters {
         bits: Vec<u32> [1..=6; 1..] = vec![1, 2, 3, 4] => "Bits of a report.",
-        noise: f64 [0.1..=30.0] = 6.0 => "Deviation of a range, m.",
+        noise: f64 [0.1..=30.0] = NOISE => "Deviation of a range, m.",
         trials: u64 [2..=10_000] = 60 => quick 4 => "Runs of each scenario.",
     }
     cost |p| Cost::new(0.02 * (p.trials * (p.bits.len() as u64 + 1)) as f64, 1e8);
@@ -23,6 +25,7 @@ rows! {
         bits: u32 as x("bits of a report") => "Bits of a report.",
         gospa: Measured ["m"] as points("few bits") => "GOSPA of the confirmed tracks (order 2, cut-off 20 m), root mean square over steps and runs.",
         full: Measured ["m"] as dashed("full values") => "The same with full values on the same worlds.",
+        jpda: Option<f64> ["m"] as dashed("Stone Soup, full values") => "Stone Soup's joint probabilistic data association with the same full values, told which targets there are and when.",
         /// Root mean square over steps and runs of each part.
         localisation: Measured ["m"] as curve("its localisation") => "Its part from the distance of assigned pairs.",
         missed: Measured ["m"] as curve("its missed targets") => "Its part from missed targets.",
@@ -99,11 +102,13 @@ impl Figure for Targets {
                 sums.get(4 * i + k)
                     .map_or(Measured::new(f64::NAN, None), Measured::root_mean)
             };
+            let jpda = reference::value(&format!("targets-gospa/jpda/{name}")).filter(|_| p.noise == NOISE);
             rows.extend(p.bits.iter().enumerate().map(|(i, bits)| Row {
                 scenario: name,
                 bits: *bits,
                 gospa: part(i + 1, 0),
                 full: part(0, 0),
+                jpda,
                 localisation: part(i + 1, 1),
                 missed: part(i + 1, 2),
                 false_targets: part(i + 1, 3),
@@ -122,6 +127,8 @@ impl Figure for Targets {
             full.at_most(format!("three-bits-{id}"), what, of(3), 1.15);
             full.decreasing(format!("bits-{id}"), "more bits, less error", [1, 2, 3].map(of));
         }
+        // Another program's numbers, which stand beside ours: it knows what ours has to find.
+        claims.shown("jpda");
         let sum = |r: &Row| {
             [r.localisation, r.missed, r.false_targets]
                 .map(|part| part.value.powi(2))

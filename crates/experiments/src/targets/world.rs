@@ -203,3 +203,26 @@ impl Reporting {
 
 /// A report as the tracker takes it.
 pub(super) type Seen = Observed<AutoSensing<Range, 1>, Scalar, 1>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Context;
+
+    #[test]
+    #[ignore = "prints the worlds that references/targets.py reads"]
+    fn worlds_are_written() {
+        for (name, scenario) in Scenario::ALL {
+            let stream = Context::new(1).stream("targets-gospa").named(name);
+            let trials = Context::new(1)
+                .trials(stream, 60, |trial| draw(scenario, 6.0, trial.stream))
+                .unwrap();
+            assert!(trials.iter().all(|moments| moments.len() == STEPS));
+            for moments in trials {
+                let moment = |m: &Moment| serde_json::json!({ "targets": m.targets, "ranges": m.ranges });
+                let moments: Vec<_> = moments.iter().map(moment).collect();
+                println!("{}", serde_json::json!({ "scenario": name, "moments": moments }));
+            }
+        }
+    }
+}

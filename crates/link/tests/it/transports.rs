@@ -24,26 +24,15 @@ fn next<T: Transport>(transport: &mut T) -> (T::Address, Vec<u8>) {
     (from, bytes.to_vec())
 }
 
-/// Slots by hand: every datagram that is not lost arrives before the next step, however slow the machine is. `sensors` are ends with the address of
-/// the centre.
-fn by_hand<T: Transport>(reports: Reports, centre: &mut T, sensors: &mut [(T, T::Address)]) -> Vec<Record> {
-    let count = sensors.len();
-    let mut nodes: Vec<_> = sensors.iter().map(|_| node(reports)).collect();
-    let mut links: Vec<_> = (0..count as u32)
-        .map(|number| SensorLink::new(SensorSettings::new(Feedback::Told), number, key(number), None).unwrap())
-        .collect();
-    let loss = 1.0 - (1.0 - LOSS).powi(2);
-    let known = (0..count as u32).map(|number| fewbits_link::Peer {
-        number,
-        key: key(number),
-        address: None,
-    });
-    let mut station =
-        Station::new(settings(reports, 10, count), receiver(reports, loss), known.collect(), None).unwrap();
-    let (mut outputs, mut requests) = (Vec::new(), Vec::new());
-    let mut rng = fewbits_monte_carlo::Stream::new(9).rng();
-    // A transport may need a while until both ends know of each other.
-    for ((transport, to), link) in sensors.iter_mut().zip(&mut links) {
+/// Sensors say where they are until the centre has heard each: a transport may need a while until both ends know of each other.
+fn all_heard<T: Transport>(
+    station: &mut Station<Box<dyn fewbits_protocol::Receiver>, T::Address>,
+    centre: &mut T,
+    sensors: &mut [(T, T::Address)],
+    links: &mut [SensorLink],
+) {
+    let mut outputs = Vec::new();
+    for ((transport, to), link) in sensors.iter_mut().zip(links) {
         let (before, start) = (station.counts().taken, Instant::now());
         while station.counts().taken == before {
             assert!(start.elapsed() < Duration::from_secs(60), "no hello arrives");
@@ -56,8 +45,47 @@ fn by_hand<T: Transport>(reports: Reports, centre: &mut T, sensors: &mut [(T, T:
             }
         }
     }
+}
+
+/// Slots by hand: every datagram that is not lost arrives before the next step, however slow the machine is. `sensors` are ends with the address of
+/// the centre. With `moves`, another centre with the same state goes on after half of the slots, at the transport that is returned.
+fn by_hand<T: Transport>(
+    reports: Reports,
+    mut centre: T,
+    sensors: &mut [(T, T::Address)],
+    mut moves: Option<&mut dyn FnMut(T) -> T>,
+) -> Vec<Record> {
+    let count = sensors.len();
+    let folder = tempfile::tempdir().unwrap();
+    let mut nodes: Vec<_> = sensors.iter().map(|_| node(reports)).collect();
+    let mut links: Vec<_> = (0..count as u32)
+        .map(|number| SensorLink::new(SensorSettings::new(Feedback::Told), number, key(number), None).unwrap())
+        .collect();
+    let loss = 1.0 - (1.0 - LOSS).powi(2);
+    let is_moved = moves.is_some();
+    let begin = || {
+        let known = (0..count as u32).map(|number| fewbits_link::Peer {
+            number,
+            key: key(number),
+            address: None,
+        });
+        let store = is_moved.then(|| fewbits_link::Store::new(folder.path().join("state")));
+        Station::new(settings(reports, 10, count), receiver(reports, loss), known.collect(), store).unwrap()
+    };
+    let mut station = begin();
+    let (mut outputs, mut requests) = (Vec::new(), Vec::new());
+    let mut rng = fewbits_monte_carlo::Stream::new(9).rng();
+    all_heard(&mut station, &mut centre, sensors, &mut links);
     let mut records = Vec::new();
     for slot in 1..=SLOTS {
+        if slot == SLOTS / 2
+            && let Some(moves) = &mut moves
+        {
+            drop(station);
+            centre = moves(centre);
+            station = begin();
+            all_heard(&mut station, &mut centre, sensors, &mut links);
+        }
         station.on_time(10 * slot, &mut outputs).unwrap();
         let questions = outputs.drain(..).filter_map(|output| match output {
             Output::Datagram { to, bytes } => Some((to, bytes)),
@@ -90,7 +118,7 @@ fn by_hand<T: Transport>(reports: Reports, centre: &mut T, sensors: &mut [(T, T:
             }
         }
         for _ in 0..expected {
-            let (from, bytes) = next(centre);
+            let (from, bytes) = next(&mut centre);
             station.on_datagram(from, &bytes, &mut outputs).unwrap();
         }
         station.on_time(10 * slot + 9, &mut outputs).unwrap();
@@ -106,13 +134,28 @@ fn by_hand<T: Transport>(reports: Reports, centre: &mut T, sensors: &mut [(T, T:
 
 /// The same over UDP.
 fn over_udp(reports: Reports) -> Vec<Record> {
-    let mut centre = Udp::bind("127.0.0.1:0").unwrap();
+    udp(reports, None)
+}
+
+fn udp(reports: Reports, moves: Option<&mut dyn FnMut(Udp) -> Udp>) -> Vec<Record> {
+    let centre = Udp::bind("127.0.0.1:0").unwrap();
     let address = centre.address();
     let mut sensors: Vec<_> = peers(reports.sensors())
         .iter()
         .map(|_| (Udp::bind("127.0.0.1:0").unwrap(), address))
         .collect();
-    by_hand(reports, &mut centre, &mut sensors)
+    by_hand(reports, centre, &mut sensors, moves)
+}
+
+/// A fleet, or a part of one, moves to another centre: no report is lost, and the estimates are those of a centre that stayed.
+#[test]
+fn a_fleet_moves_over_udp() {
+    let mut moves = |old: Udp| {
+        let address = old.address();
+        drop(old);
+        Udp::bind(address).unwrap()
+    };
+    assert_eq!(udp(Reports::Signs, Some(&mut moves)), over_udp(Reports::Signs));
 }
 
 /// Signs, censored values and counted signs over a transport and over UDP. `end` is the centre's, or a sensor's with its number.
@@ -123,14 +166,32 @@ fn assert_as_over_udp<T: Transport<Address = u32>>(mut end: impl FnMut(&str, Opt
         ("b/c", Reports::Censored),
         ("d", Reports::Counted),
     ] {
-        let mut centre = end(fleet, None);
+        let centre = end(fleet, None);
         let mut sensors: Vec<_> = (0..reports.sensors())
             .map(|number| (end(fleet, Some(number)), number))
             .collect();
         let start = Instant::now();
-        let records = by_hand(reports, &mut centre, &mut sensors);
+        let records = by_hand(reports, centre, &mut sensors, None);
         println!("{reports:?}: {SLOTS} slots in {:?}", start.elapsed());
         assert_eq!(records, over_udp(reports), "{reports:?}");
+    }
+}
+
+/// The part `plant/north` of a fleet moves to another centre, which is heard before the next slot; `plant/south` stays.
+#[cfg(any(feature = "mqtt", feature = "zenoh"))]
+fn assert_moved<T: Transport<Address = u32>>(mut end: impl FnMut(&str, Option<u32>) -> T) {
+    for (part, is_moved) in [("plant/north", true), ("plant/south", false)] {
+        let centre = end(part, None);
+        let mut sensors: Vec<_> = (0..Reports::Signs.sensors())
+            .map(|number| (end(part, Some(number)), number))
+            .collect();
+        let mut again = |old: T| {
+            let new = end(part, None);
+            drop(old);
+            new
+        };
+        let moves: Option<&mut dyn FnMut(T) -> T> = if is_moved { Some(&mut again) } else { None };
+        assert_eq!(by_hand(Reports::Signs, centre, &mut sensors, moves), over_udp(Reports::Signs), "{part}");
     }
 }
 
@@ -256,6 +317,13 @@ mod mqtt {
     }
 
     #[test]
+    fn a_part_of_a_fleet_moves_over_mqtt() {
+        if let Some(broker) = Broker::start() {
+            assert_moved(|fleet, sensor| broker.end(fleet, sensor).unwrap());
+        }
+    }
+
+    #[test]
     fn broker_that_stops_and_comes_back() {
         let Some(broker) = Broker::start() else { return };
         let (mut centre, mut sensor) = (broker.end("f", None).unwrap(), broker.end("f", Some(3)).unwrap());
@@ -324,15 +392,18 @@ mod mqtt {
 }
 
 #[cfg(feature = "zenoh")]
-#[test]
-fn same_estimates_over_zenoh() {
+mod zenohs {
+    use super::*;
     use fewbits_link::zenoh::{Zenoh, zenoh};
-    use zenoh::Wait;
-    let free = std::net::TcpListener::bind("127.0.0.1:0")
-        .unwrap()
-        .local_addr()
-        .unwrap();
-    let session = |listens: bool| {
+    use zenoh::{Session, Wait};
+
+    fn free() -> std::net::SocketAddr {
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        listener.local_addr().unwrap()
+    }
+
+    /// A session that listens at the place, or connects to it.
+    fn session(mode: &str, place: std::net::SocketAddr, listens: bool) -> Session {
         let mut config = zenoh::Config::default();
         let way = if listens {
             "listen/endpoints"
@@ -340,20 +411,37 @@ fn same_estimates_over_zenoh() {
             "connect/endpoints"
         };
         let settings = [
-            ("mode", "\"peer\"".to_owned()),
+            ("mode", format!("\"{mode}\"")),
             ("scouting/multicast/enabled", "false".to_owned()),
             ("listen/endpoints", "[]".to_owned()),
-            (way, format!("[\"tcp/{free}\"]")),
+            (way, format!("[\"tcp/{place}\"]")),
         ];
         settings
             .iter()
             .for_each(|(name, value)| config.insert_json5(name, value).unwrap());
         zenoh::open(config).wait().unwrap()
-    };
-    // The centre's session listens, those of the sensors connect to it: no router.
-    let (centre, sensors) = (session(true), [session(false), session(false)]);
-    assert_as_over_udp(|fleet, sensor| match sensor {
-        None => Zenoh::centre(centre.clone(), fleet).unwrap(),
-        Some(number) => Zenoh::sensor(sensors[number as usize % 2].clone(), fleet, number).unwrap(),
-    });
+    }
+
+    #[test]
+    fn same_estimates_over_zenoh() {
+        let place = free();
+        // The centre's session listens, those of the sensors connect to it: no router.
+        let (centre, sensors) = (session("peer", place, true), [(); 2].map(|()| session("peer", place, false)));
+        assert_as_over_udp(|fleet, sensor| match sensor {
+            None => Zenoh::centre(centre.clone(), fleet).unwrap(),
+            Some(number) => Zenoh::sensor(sensors[number as usize % 2].clone(), fleet, number).unwrap(),
+        });
+    }
+
+    /// Every centre has a session of its own, as on another machine; a router is between them and the sensors.
+    #[test]
+    fn a_part_of_a_fleet_moves_over_zenoh() {
+        let place = free();
+        let _router = session("router", place, true);
+        let sensors = session("client", place, false);
+        assert_moved(|fleet, sensor| match sensor {
+            None => Zenoh::centre(session("client", place, false), fleet).unwrap(),
+            Some(number) => Zenoh::sensor(sensors.clone(), fleet, number).unwrap(),
+        });
+    }
 }

@@ -135,6 +135,17 @@ fn numbers_that_no_double_holds_are_refused() {
     }
     let message = refusal(&mut open("time,x\n0,1.5\n1,9007199254740993.0\n2,2.5\n"));
     assert!(message.contains("53 bits"), "{message}");
+    // Defect: a first row of such numbers was taken for the line of names, and the names were dropped.
+    for row in ["1e400", "-1e999", "1e-400", "36893488147419103233"] {
+        for columns in [1, 2] {
+            let [names, first, second] = ["a", row, "1"].map(|cell| vec![cell; columns].join(","));
+            let names = names.replace("a,a", "a,b");
+            let mut table = open(&format!("{names}\n{first}\n{second}\n"));
+            assert_eq!(table.columns()[0].name, "a");
+            let message = refusal(&mut table);
+            assert!(message.contains(&format!("line 2 (row 1), column `a`: `{row}`")), "{message}");
+        }
+    }
 }
 
 #[test]
