@@ -124,6 +124,16 @@ macro_rules! limits {
 /// assert_eq!(fewbits_experiments::Table::of(&vec![Row { distance: 2.0, bit: 1 }])?[0].columns[0].unit, "m");
 /// # Ok::<(), fewbits_experiments::Error>(())
 /// ```
+///
+/// Another role does not compile, and the error points at it:
+///
+/// ```compile_fail
+/// fewbits_experiments::rows! {
+///     struct Row {
+///         distance: f64 ["m"] as abscissa => "Distance from the sensor.",
+///     }
+/// }
+/// ```
 #[macro_export]
 macro_rules! rows {
     (@fields $name:ident [$($key:tt $($effort:ident)?)?]

@@ -268,7 +268,8 @@ pub struct List<T>(pub Vec<T>);
 
 impl<T: ToString> Field for List<T> {
     fn put(&self, to: &mut Cells) {
-        crate::sweep::joined(self.0.iter().map(T::to_string), " ").put(to);
+        let words: Vec<String> = self.0.iter().map(T::to_string).collect();
+        words.join(" ").put(to);
     }
 }
 

@@ -1,7 +1,7 @@
 //! What schemes that tables name briefly are called in a plot.
 
 /// Names in tables, and in words. One that ends in `-` stands for all that go on with a number.
-const WORDS: [(&str, &str); 49] = [
+const WORDS: [(&str, &str); 51] = [
     ("ADF", "assumed density"),
     ("CFoMD", "silence ignored (CFoMD)"),
     ("CFwMD", "silence used (CFwMD)"),
@@ -24,6 +24,8 @@ const WORDS: [(&str, &str); 49] = [
     ("cramer-rao", "Cramér-Rao"),
     ("dpcm-0", "deadband, last value"),
     ("dpcm-1", "deadband, last slope"),
+    ("eq14", "equation (14), printed"),
+    ("eq14_exact", "equation (14), exact"),
     ("gaussian", "Gaussian"),
     ("gaussian-", "Gaussian, numbers: "),
     ("genie", "order known"),

@@ -20,8 +20,8 @@ fn further_patterns_separate_with_the_gray_basis() {
     check_separation(&patterns).unwrap();
 }
 
-/// Independent over GF(2), yet two cells carry the same column: footnote 2 of the thesis holds for linear patterns only (erratum
-/// binary-3).
+/// Independent over GF(2), yet two cells carry the same column: footnote 2 of the thesis holds for linear patterns only
+/// (erratum binary-3).
 #[test]
 fn independent_patterns_that_are_not_linear_need_not_separate() {
     let patterns = ["00001111", "00110000", "01000000"].map(|text| text.parse::<Pattern>().unwrap());

@@ -24,8 +24,7 @@ rows! {
         mmse: f64 ["V^2"] as line("posterior mean") in decoders bounds => "Posterior mean.",
         cmap: f64 ["V^2"] as line("continuous MAP") in decoders => "Continuous maximum a posteriori.",
         dmap: f64 ["V^2"] as line("discrete MAP") in decoders => "Discrete maximum a posteriori, corrected.",
-        /// Discrete maximum a posteriori, equation 5.10 as printed (erratum binary-4).
-        dmap_print: f64 ["V^2"] as line("discrete MAP as printed") in decoders,
+        dmap_print: f64 ["V^2"] as line("discrete MAP as printed") in decoders => "Equation 5.10 as printed (erratum binary-4).",
         dmap_exact: f64 ["V^2"] => "Discrete maximum a posteriori, exact cells.",
         crlb: f64 ["V^2"] as dashed("equation 5.13") in bounds => "Equation 5.13.",
         vt: f64 ["V^2"] as dashed("van Trees") in bounds => "Van Trees bound with optimal weight.",

@@ -34,8 +34,7 @@ rows! {
 
     struct Rule by "{rule}" {
         rule: &'static str => "Clipping rule.",
-        /// Exact error of the posterior mean: with the printed sides even the best masks are thirteen times worse (erratum binary-1).
-        mse: f64 ["V^2"],
+        mse: f64 ["V^2"] => "Exact error of the posterior mean; thirteen times worse with the printed sides (erratum binary-1).",
     }
 }
 

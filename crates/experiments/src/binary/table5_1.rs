@@ -34,10 +34,8 @@ rows! {
         mse_exact_dmap: f64 ["V^2"] => "The same with exact cell probabilities.",
         crlb: f64 ["V^2"] => "Equation 5.13.",
         van_trees: f64 ["V^2"] => "Optimal-weight van Trees bound.",
-        /// Place among all sets under the posterior mean, from 0 (erratum binary-11); none for a set that is not of full rank.
-        rank: Option<usize>,
-        /// Place under the discrete decoder, from 0: the table fits a search with that decoder (erratum binary-19).
-        rank_dmap: Option<usize>,
+        rank: Option<usize> => "Place among all sets under the posterior mean, from 0 (erratum binary-11); none if not of full rank.",
+        rank_dmap: Option<usize> => "Place under the discrete decoder, which the table fits, from 0 (erratum binary-19).",
     }
 
     struct Space {
