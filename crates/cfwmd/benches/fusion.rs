@@ -6,15 +6,18 @@
 #![allow(clippy::unwrap_used)]
 
 use divan::{AllocProfiler, Bencher, black_box};
-use fewbits_cfwmd::censored::Censored;
+use fewbits_baselines::cfwmd::likelihood_of_particles;
+use fewbits_cfwmd::censored::{Censored, MissingReports};
 use fewbits_cfwmd::ellipsoid::Ellipsoid;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::CensoringRule;
+use fewbits_cfwmd::scheme::Censoring;
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{Factor, Gaussian, Link, Observation};
+use fewbits_core::{Factor, Gaussian, Likelihood, Link, Observation};
 use fewbits_densities::Particles;
-use fewbits_filters::{BootstrapFilter, ResamplingRule, StateFilter, kalman};
-use fewbits_models::{LinearSensor, ScalarSensor, constant_velocity_1d};
+use fewbits_filters::centre::{FusionCentre, Slot};
+use fewbits_filters::{BootstrapFilter, MomentFilter, ResamplingRule, StateFilter, assumed_density, kalman};
+use fewbits_models::{ContinuousLinear, LinearSensor, ScalarSensor, constant_velocity_1d};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix1, Matrix2, Vector1, Vector2};
 use rand::RngExt;
@@ -56,13 +59,81 @@ fn gaussian(bencher: Bencher<'_, '_>, silent: usize) {
     let (network, rules) = network();
     let dynamics = constant_velocity_1d(1.0, 4.0).unwrap();
     let belief = Gaussian::new(Vector2::zeros(), Matrix2::new(0.6, 0.4, 0.4, 2.0)).unwrap();
+    let observations = observed(silent).map(Some);
+    bencher.bench_local(|| {
+        let mut belief = kalman::predict(&dynamics, black_box(&belief));
+        let all = network.likelihoods(&rules, &Vector2::zeros(), &observations).unwrap();
+        all.condition(&mut belief).unwrap();
+        belief
+    });
+}
+
+/// The loop that knows the types of its likelihoods: a Kalman update for each value, then one for the silence. The others are multiples of it.
+#[divan::bench(args = [0, 1, 2])]
+fn typed_loop_unit(bencher: Bencher<'_, '_>, silent: usize) {
+    let (network, rules) = network();
+    let dynamics = constant_velocity_1d(1.0, 4.0).unwrap();
+    let belief = Gaussian::new(Vector2::zeros(), Matrix2::new(0.6, 0.4, 0.4, 2.0)).unwrap();
     let observations = observed(silent);
     bencher.bench_local(|| {
-        let predicted = kalman::predict(&dynamics, black_box(&belief));
-        network
-            .fuse(&predicted, &rules, &Vector2::zeros(), &observations)
-            .unwrap()
+        let mut belief = kalman::predict(&dynamics, black_box(&belief));
+        let scheme = |i: usize| Censoring::new(network.sensors()[i], rules[i].clone(), network.format()).unwrap();
+        let (mut log_likelihood, mut missing) = (0.0, MissingReports::default());
+        for (i, (sensor, observation)) in network.sensors().iter().zip(&observations).enumerate() {
+            match observation {
+                Observation::Received(value) => {
+                    scheme(i).received(&Vector2::zeros(), value, network.link()).unwrap();
+                    let (next, info) = kalman::update(sensor, &belief, value).unwrap();
+                    belief = next;
+                    log_likelihood += info.log_likelihood;
+                }
+                _ => missing.nothing += 1,
+            }
+        }
+        if missing.nothing > 0 {
+            let factor = scheme(1).missing(&Vector2::zeros(), network.link(), missing).unwrap();
+            let (next, info) = assumed_density::update(&belief, network.sensors()[1].matrix(), &factor).unwrap();
+            belief = next;
+            log_likelihood += info.log_likelihood;
+        }
+        (belief, log_likelihood)
     });
+}
+
+/// The same behind the contract of filters: likelihoods without their types.
+#[divan::bench(args = [0, 1, 2])]
+fn contract(bencher: Bencher<'_, '_>, silent: usize) {
+    let (network, rules) = network();
+    let dynamics = constant_velocity_1d(1.0, 4.0).unwrap();
+    let belief = Gaussian::new(Vector2::zeros(), Matrix2::new(0.6, 0.4, 0.4, 2.0)).unwrap();
+    let observations = observed(silent).map(Some);
+    let (mut filter, mut rng) = (MomentFilter, Stream::new(3).fast_rng());
+    bencher.bench_local(|| {
+        let mut belief = black_box(&belief).to_owned();
+        filter.predict(&mut rng, &dynamics, &mut belief).unwrap();
+        let all = network.likelihoods(&rules, &Vector2::zeros(), &observations).unwrap();
+        filter.update(&mut rng, &mut belief, &[&all]).unwrap();
+        belief
+    });
+}
+
+/// A centre of many identical sensors, all silent: one likelihood with a count.
+#[divan::bench(args = [2, 10, 100])]
+fn centre_of_silent_sensors(bencher: Bencher<'_, '_>, sensors: u32) {
+    let sensor = LinearSensor::scalar(Vector2::new(1.0, 0.0), 1.0).unwrap();
+    let network = Network::new(vec![sensor; sensors as usize], 1.0, Link::PERFECT).unwrap();
+    let (world, prior) = (
+        ContinuousLinear::nearly_constant_velocity(4.0).unwrap(),
+        Gaussian::new(Vector2::zeros(), Matrix2::new(0.6, 0.4, 0.4, 2.0)).unwrap(),
+    );
+    let mut rng = Stream::new(4).fast_rng();
+    let mut centre = FusionCentre::new(&mut rng, world, MomentFilter, &prior).unwrap();
+    network.join(&mut centre).unwrap();
+    let told = centre.feedback(0).unwrap();
+    let slots: Vec<Slot> = (0..sensors)
+        .map(|i| Slot::new(i, told.clone(), Observation::Nothing))
+        .collect();
+    bencher.bench_local(|| centre.receive(&mut rng, black_box(&slots)).unwrap().info);
 }
 
 #[divan::bench(args = [0, 1, 2])]
@@ -78,7 +149,7 @@ fn particles_1000(bencher: Bencher<'_, '_>, silent: usize) {
     let mut step = || {
         cloud.clone_from(&start);
         filter.predict(&mut rng, &dynamics, &mut cloud).unwrap();
-        let likelihood = network.likelihood(&rules, &Vector2::zeros(), &observations).unwrap();
+        let likelihood = likelihood_of_particles(&network, &rules, &Vector2::zeros(), &observations).unwrap();
         filter.update(&mut rng, &mut cloud, &[&likelihood]).unwrap();
         cloud.mean()
     };

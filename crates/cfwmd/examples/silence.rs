@@ -2,7 +2,7 @@
 
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{Dynamics, Gaussian, Link, Sensing};
+use fewbits_core::{Dynamics, Gaussian, Likelihood, Link, Sensing};
 use fewbits_filters::kalman;
 use fewbits_models::{LinearSensor, constant_velocity_1d};
 use nalgebra::Vector2;
@@ -21,7 +21,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let rules = network.rules_under(&predicted)?;
         let measurements: Vec<_> = (0..2).map(|_| sensor.sample(&mut rng, &truth)).collect();
         let (observations, sent) = network.transmit(&mut rng, &rules, predicted.mean(), &measurements)?;
-        belief = network.fuse(&predicted, &rules, predicted.mean(), &observations)?.0;
+        let observed: Vec<_> = observations.into_iter().map(Some).collect();
+        belief = predicted;
+        network
+            .likelihoods(&rules, predicted.mean(), &observed)?
+            .condition(&mut belief)?;
         let (error, deviation) = (belief.mean()[0] - truth[0], belief.standard_deviations()[0]);
         println!("{k:2}: {sent} sent, error {error:6.2} m, believed deviation {deviation:.2} m");
     }

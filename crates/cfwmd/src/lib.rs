@@ -10,7 +10,8 @@
 //! | the rule, and whose covariance weighs the innovation | [`CensoringRule`](rule::CensoringRule), [`Weighing`](rule::Weighing), [`OwnRecursion`](rule::OwnRecursion) |
 //! | the schemes: state feedback or a schedule, state and covariance feedback, none | [`Censoring`](scheme::Censoring), [`CovarianceFeedback`](scheme::CovarianceFeedback), [`LocalSensor`](no_feedback::LocalSensor) |
 //! | `ln p(value or silence given the noise-free measurement)` | [`Censored`](censored::Censored), [`Ellipsoid`](ellipsoid::Ellipsoid) |
-//! | fusion with feedback: Gaussian (the default), or a likelihood for any particle or grid filter | [`Network::fuse`](network::Network::fuse), [`Network::likelihood`](network::Network::likelihood) |
+//! | fusion with feedback, in a [`FusionCentre`](fewbits_filters::centre::FusionCentre) of any filter | [`Network::join`](network::Network::join), [`Network::remote_under`](network::Network::remote_under) |
+//! | the same without a centre: the likelihoods of an instant | [`Network::likelihoods`](network::Network::likelihoods) |
 //! | fusion without feedback | [`no_feedback`] |
 //! | thresholds before deployment | [`expected_covariances`](schedule::expected_covariances) |
 //! | information of a message or of silence | [`information`] |
@@ -24,7 +25,7 @@
 //! ```
 //! use fewbits_cfwmd::network::Network;
 //! use fewbits_cfwmd::threshold::Budget;
-//! use fewbits_core::{Gaussian, Link};
+//! use fewbits_core::{Gaussian, Likelihood, Link};
 //! use fewbits_filters::kalman;
 //! use fewbits_models::{LinearSensor, constant_velocity_1d};
 //! use nalgebra::{Vector1, Vector2};
@@ -46,17 +47,20 @@
 //! assert_eq!(sent, 1);
 //!
 //! // One value and one silence, both informative.
-//! let (belief, info) = network.fuse(&predicted, &rules, predicted.mean(), &observations)?;
-//! assert_eq!(info.received, 1);
+//! let mut belief = predicted;
+//! let observed: Vec<_> = observations.into_iter().map(Some).collect();
+//! network.likelihoods(&rules, predicted.mean(), &observed)?.condition(&mut belief)?;
 //! assert!(belief.mean()[0] > 10.0 && belief.mean()[0] < 12.5);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! Not here: the radio (`fewbits-network`), and the design of a quantizer for the values (`fewbits-quantizer-design`).
+#![warn(unreachable_pub)]
 
 pub mod censored;
 pub mod ellipsoid;
 pub mod information;
+mod missing;
 pub mod network;
 pub mod no_feedback;
 pub mod rule;

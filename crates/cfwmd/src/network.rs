@@ -1,11 +1,12 @@
-//! Model of a network of censoring sensors with feedback, as its fusion centre knows it, and the fusion step.
+//! A network of censoring sensors with feedback, as its fusion centre knows it.
 
 use crate::Error;
 use crate::censored::{Censored, MissingReports};
 use crate::rule::CensoringRule;
-use crate::scheme::{Censoring, rule_under};
+use crate::scheme::{Censoring, CovarianceFeedback, rule_under};
 use fewbits_core::{Gaussian, LinearSensing, Link, NumberFormat, Observation, Observed, Scheme, Sensing};
-use fewbits_filters::{assumed_density, kalman};
+use fewbits_filters::StateFilter;
+use fewbits_filters::centre::{FusionCentre, Reporting};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{at_least_one, entries, non_negative};
 use nalgebra::SVector;
@@ -22,19 +23,11 @@ pub struct Network<S, const D: usize, const M: usize> {
     format: NumberFormat,
 }
 
-/// Likelihood and received values of one fusion step.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[non_exhaustive]
-pub struct FusionInfo {
-    /// `ln p(all observations | those of the past)`: densities of the values, probabilities of the silences. It is an approximation for
-    /// the assumed-density filter, because its belief is one.
-    pub log_likelihood: f64,
-    /// Number of values received.
-    pub received: usize,
-}
-
 /// One observation per sensor, and the number of reports that were sent.
 pub type Transmitted<const M: usize> = (Vec<Observation<SVector<f64, M>>>, usize);
+
+/// A sensor of a [`Network`] as a fusion centre knows it, with the scheme `C` and the feedback `A`.
+pub type Remote<S, C, A, const D: usize, const M: usize> = Reporting<S, C, fn(&Gaussian<D>, &Gaussian<M>) -> A, M>;
 
 impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Network<S, D, M> {
     /// A network of at least one sensor with threshold `eta >= 0`; values travel in double precision.
@@ -87,12 +80,14 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
     /// # Errors
     /// If there is no sensor `i`, or `S` is not positive definite.
     pub fn rule_under(&self, i: usize, predicted: &Gaussian<D>) -> Result<CensoringRule<M>, Error> {
+        rule_under(self.sensor(i)?, predicted, self.threshold)
+    }
+
+    fn sensor(&self, i: usize) -> Result<&S, ArgumentError> {
         let expected = || format!("an index below {}, the number of sensors", self.sensors.len());
-        let sensor = self
-            .sensors
+        self.sensors
             .get(i)
-            .ok_or_else(|| ArgumentError::new("i", i, expected()))?;
-        rule_under(sensor, predicted, self.threshold)
+            .ok_or_else(|| ArgumentError::new("i", i, expected()))
     }
 
     /// [`Network::rule_under`] for every sensor.
@@ -137,40 +132,67 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
         Ok(entries("observations", observations, self.sensors.len())?)
     }
 
-    /// The observations as a likelihood for particle and grid filters. There is one entry per group of identical scalar sensors that
-    /// sent a value, one per group of identical scalar sensors whose reports are missing under the same rule, and one per other sensor.
+    /// Sensor `i` as a fusion centre knows it, with covariance feedback: identical scalar sensors are a group, whose silence is one factor.
+    ///
+    /// # Errors
+    /// If there is no sensor `i`; as [`CovarianceFeedback::new`].
+    pub fn remote(&self, i: usize) -> Result<Remote<S, CovarianceFeedback<S, D, M>, Gaussian<D>, D, M>, Error> {
+        let sensor = self.sensor(i)?.clone();
+        let scheme = CovarianceFeedback::new(sensor.clone(), self.threshold, self.format)?;
+        let ask = (|predicted, _| *predicted) as fn(&Gaussian<D>, &Gaussian<M>) -> Gaussian<D>;
+        Ok(Reporting::new(sensor, scheme, self.link, ask).in_group(self.identical[i] as u32))
+    }
+
+    /// Sensor `i` as a fusion centre knows it in a slot with this rule, which both ends know: that of the sensor's own recursion or of a schedule.
+    /// A centre takes the rule of the next slot by [`FusionCentre::renew`]. Identical sensors have the same rule.
+    ///
+    /// # Errors
+    /// If there is no sensor `i`; as [`Censoring::new`].
+    pub fn remote_under(
+        &self,
+        i: usize,
+        rule: &CensoringRule<M>,
+    ) -> Result<Remote<S, Censoring<S, D, M>, SVector<f64, D>, D, M>, Error> {
+        let ask = (|predicted, _| *predicted.mean()) as fn(&Gaussian<D>, &Gaussian<M>) -> SVector<f64, D>;
+        let sensor = self.sensor(i)?.clone();
+        Ok(Reporting::new(sensor, self.scheme(i, rule)?, self.link, ask).in_group(self.identical[i] as u32))
+    }
+
+    /// Joins all sensors to a centre, numbered from 0, with covariance feedback.
+    ///
+    /// # Errors
+    /// As [`remote`](Self::remote) and [`FusionCentre::join`].
+    pub fn join<F: StateFilter<D>>(&self, centre: &mut FusionCentre<D, F>) -> Result<(), Error>
+    where
+        S: LinearSensing<D, M> + 'static,
+    {
+        (0..self.sensors.len()).try_for_each(|i| centre.join(i as u32, self.remote(i)?))
+    }
+
+    /// The observations of one instant as likelihoods, in the order in which a Gaussian is best conditioned on them: the values, then the missing
+    /// reports. Those of identical scalar sensors under the same rule are one. Together they are the `Likelihood` of the instant, for any
+    /// filter; a value updates a Gaussian by the Kalman filter. `None` stands for a sensor that was not asked.
     ///
     /// # Errors
     /// If the numbers of rules or observations are wrong, a number is not finite, or a value violates its rule.
-    pub fn likelihood(
+    pub fn likelihoods(
         &self,
         rules: &[CensoringRule<M>],
         broadcast: &SVector<f64, D>,
-        observations: &[Observation<SVector<f64, M>>],
+        observations: &[Option<Observation<SVector<f64, M>>>],
     ) -> Result<Vec<Observed<S, Censored<M>, M>>, Error> {
         self.count(rules.len(), observations.len())?;
-        let plain = !matches!(self.format, NumberFormat::Fixed(_));
-        let mut all = Vec::new();
-        for (i, observation) in observations.iter().enumerate() {
-            let mut push = |factor| all.push(Observed::new(self.sensors[i].clone(), factor));
-            if let Observation::Received(value) = observation {
-                let single = self.scheme(i, &rules[i])?.received(broadcast, value, &self.link)?;
-                if !(M == 1 && plain) {
-                    push(single);
-                }
+        let mut all = Vec::with_capacity(observations.len());
+        for (i, sensor) in self.sensors.iter().enumerate() {
+            if let Some(Observation::Received(value)) = &observations[i] {
+                let factor = self.scheme(i, &rules[i])?.received(broadcast, value, &self.link)?;
+                all.push(Observed::new(sensor.clone(), factor));
             }
-            // Scalar values of identical sensors are combined into one factor; the first sensor of the group carries it.
-            if M == 1 && plain && self.identical[i] == i {
-                let like = |j: usize| self.identical[j] == i;
-                let received = |j: usize| observations[j].received().filter(|_| like(j)).copied();
-                let values: Vec<_> = (i..observations.len()).filter_map(received).collect();
-                if !values.is_empty() {
-                    let noise = self.sensors[i].noise_covariance_at(broadcast);
-                    push(Censored::values(&values, &noise, self.link.of_received()?)?);
-                }
-            }
-            if let Some(missing) = self.missing_together(rules, |j| Some(observations[j]), i) {
-                push(self.scheme(i, &rules[i])?.missing(broadcast, &self.link, missing)?);
+        }
+        for (i, sensor) in self.sensors.iter().enumerate() {
+            if let Some(missing) = self.missing_together(rules, observations, i) {
+                let factor = self.scheme(i, &rules[i])?.missing(broadcast, &self.link, missing)?;
+                all.push(Observed::new(sensor.clone(), factor));
             }
         }
         Ok(all)
@@ -181,87 +203,19 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
     fn missing_together(
         &self,
         rules: &[CensoringRule<M>],
-        observed: impl Fn(usize) -> Option<Observation<SVector<f64, M>>>,
+        observed: &[Option<Observation<SVector<f64, M>>>],
         i: usize,
     ) -> Option<MissingReports> {
-        let missing = |j: usize| observed(j).is_some_and(|observed| observed.received().is_none());
+        let missing = |j: usize| observed[j].is_some_and(|observed| observed.received().is_none());
         let alike = |j: usize| missing(j) && self.identical[j] == self.identical[i] && rules[j] == rules[i];
         if !missing(i) || (M == 1 && (0..i).any(alike)) {
             return None;
         }
         let last = if M == 1 { self.sensors.len() } else { i + 1 };
-        let of = |kind| (i..last).filter(|j| alike(*j) && observed(*j) == Some(kind)).count();
+        let of = |kind| (i..last).filter(|j| alike(*j) && observed[*j] == Some(kind)).count();
         Some(MissingReports {
             nothing: of(Observation::Nothing),
             lost: of(Observation::Lost),
         })
-    }
-}
-
-impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Network<S, D, M> {
-    /// One update of the Gaussian fusion centre: received values first, then missing reports. `broadcast` is the predicted state that the
-    /// sensors compared with: the mean of `predicted`, rounded to the format.
-    ///
-    /// Missing reports of identical scalar sensors are fused in one exact step, those of other sensors one after the other.
-    ///
-    /// # Errors
-    /// As [`Network::likelihood`]; [`Error::Impossible`] if the observations have probability zero.
-    pub fn fuse(
-        &self,
-        predicted: &Gaussian<D>,
-        rules: &[CensoringRule<M>],
-        broadcast: &SVector<f64, D>,
-        observations: &[Observation<SVector<f64, M>>],
-    ) -> Result<(Gaussian<D>, FusionInfo), Error> {
-        let asked: Vec<_> = observations.iter().copied().map(Some).collect();
-        self.fuse_asked(predicted, rules, broadcast, &asked)
-    }
-
-    /// As [`fuse`](Self::fuse). `None` stands for a sensor without observation: it was not asked, or its report cannot be used. Neither
-    /// its value nor its silence is fused.
-    ///
-    /// # Errors
-    /// As [`fuse`](Self::fuse).
-    pub fn fuse_asked(
-        &self,
-        predicted: &Gaussian<D>,
-        rules: &[CensoringRule<M>],
-        broadcast: &SVector<f64, D>,
-        observations: &[Option<Observation<SVector<f64, M>>>],
-    ) -> Result<(Gaussian<D>, FusionInfo), Error> {
-        self.count(rules.len(), observations.len())?;
-        let (mut belief, mut info, mut plain) = (*predicted, FusionInfo::default(), 0_usize);
-        let update = |belief: &mut Gaussian<D>, i: usize, factor: &Censored<M>| -> Result<f64, Error> {
-            let (next, step) = assumed_density::update(belief, self.sensors[i].matrix(), factor)?;
-            *belief = next;
-            Ok(step.log_likelihood)
-        };
-        for (i, sensor) in self.sensors.iter().enumerate() {
-            let Some(Observation::Received(value)) = observations[i] else {
-                continue;
-            };
-            info.received += 1;
-            let scheme = self.scheme(i, &rules[i])?;
-            if matches!(self.format, NumberFormat::Fixed(_)) {
-                info.log_likelihood += update(&mut belief, i, &scheme.received(broadcast, &value, &self.link)?)?;
-            } else {
-                // A received value: a Kalman update, which is the closed form for its factor.
-                scheme.check_value(&sensor.mean(broadcast), &value, &self.link)?;
-                let (next, step) = kalman::update(sensor, &belief, &value)?;
-                belief = next;
-                info.log_likelihood += step.log_likelihood;
-                plain += 1;
-            }
-        }
-        if plain > 0 {
-            info.log_likelihood += plain as f64 * self.link.of_received()?.ln();
-        }
-        for i in 0..self.sensors.len() {
-            if let Some(missing) = self.missing_together(rules, |j| observations[j], i) {
-                let factor = self.scheme(i, &rules[i])?.missing(broadcast, &self.link, missing)?;
-                info.log_likelihood += update(&mut belief, i, &factor)?;
-            }
-        }
-        Ok((belief, info))
     }
 }

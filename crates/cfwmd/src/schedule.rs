@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::network::Network;
-use fewbits_core::{Belief, Gaussian, LinearDynamics, LinearSensing};
+use fewbits_core::{Belief, Gaussian, Likelihood, LinearDynamics, LinearSensing};
 use fewbits_filters::kalman;
 use fewbits_numerics::error::at_least_one;
 use nalgebra::SMatrix;
@@ -41,7 +41,11 @@ where
             let rules = network.rules_under(&predicted)?;
             let measurements: Vec<_> = network.sensors().iter().map(|s| s.sample(rng, &truth)).collect();
             let (observations, _) = network.transmit(rng, &rules, predicted.mean(), &measurements)?;
-            belief = network.fuse(&predicted, &rules, predicted.mean(), &observations)?.0;
+            belief = predicted;
+            let observed: Vec<_> = observations.into_iter().map(Some).collect();
+            network
+                .likelihoods(&rules, predicted.mean(), &observed)?
+                .condition(&mut belief)?;
         }
     }
     Ok(sums.into_iter().map(|sum| sum / runs as f64).collect())

@@ -39,6 +39,7 @@
 //! ```
 //!
 //! This crate contains no particular model, filter or experiment.
+#![warn(unreachable_pub)]
 
 pub mod assumed_density;
 pub mod belief;
@@ -66,6 +67,8 @@ pub mod scheme;
 pub mod sensing;
 pub mod sensor_node;
 pub mod sign;
+#[doc(hidden)]
+pub mod value_update;
 
 pub use belief::{Belief, Density};
 pub use bits::{BitReader, BitString, BitWriter, CodecError};

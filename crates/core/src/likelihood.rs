@@ -8,6 +8,7 @@ use crate::gaussian::Gaussian;
 use crate::observed::Observed;
 use crate::points;
 use crate::sensing::Sensing;
+use crate::value_update;
 use fewbits_numerics::error::refuse;
 use nalgebra::{SMatrix, SVector};
 
@@ -259,6 +260,13 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> Likelihood<
 
     #[inline]
     fn condition(&self, belief: &mut Gaussian<D>) -> Result<Evidence, Error> {
+        if let Some((value, noise, log_scale)) = self.factor.as_value() {
+            let jacobian = self.sensing.jacobian(belief.mean());
+            let innovation = value - self.sensing.mean(belief.mean());
+            let (posterior, info) = value_update::update(&jacobian, &noise, belief, &value, innovation)?;
+            *belief = posterior;
+            return Ok(Evidence::new(info.log_likelihood + log_scale, &(jacobian * (info.gain * innovation))));
+        }
         let (posterior, info) = assumed_density::update_through(belief, self)?;
         *belief = posterior;
         Ok(Evidence::new(info.log_likelihood, &info.correction))

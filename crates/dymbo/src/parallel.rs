@@ -31,7 +31,7 @@ pub enum CountFusion {
 }
 
 /// Largest number of sensors.
-pub const MAX_SENSORS: usize = 1000;
+const MAX_SENSORS: usize = 1000;
 
 /// The filter for `K` sensors that answer the same threshold at once.
 ///

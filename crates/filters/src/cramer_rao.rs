@@ -1,13 +1,12 @@
 //! Posterior Cramer-Rao recursions: a lower bound on the mean squared error of any filter.
 //!
 //! Tichavsky, Muravchik and Nehorai (1998) compute the inverse of the bound recursively. For dynamics with a
-//! density, `J_k = D22 - D21 (J_{k-1} + D11)^-1 D12` ([`information_step`]). For linear dynamics and observations of Fisher information
+//! density, `J_k = D22 - D21 (J_{k-1} + D11)^-1 D12`. For linear dynamics and observations of Fisher information
 //! `I_k = E[-d^2 ln p(observed | x) / dx^2]`, the same recursion is done on the bound itself ([`covariance_step`]). It needs no
 //! inverse of the process noise, which may then be singular.
 
 use crate::Error;
 use fewbits_core::LinearDynamics;
-use fewbits_numerics::ArgumentError;
 use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
 use nalgebra::{Cholesky, SMatrix};
 
@@ -31,21 +30,4 @@ pub fn covariance_step<const D: usize>(
     let inner = SMatrix::<f64, D, D>::identity() + root.transpose() * cross;
     let factor = Cholesky::new(inner).ok_or(Error::SingularInnovation)?;
     Ok(symmetrised(&(predicted - cross * factor.solve(&cross.transpose()))))
-}
-
-/// One step of the bound's inverse: `D22 - D21 (J + D11)^-1 D12`, where the `D` are the expected second derivatives of
-/// `-ln p(x_k | x_{k-1}) - ln p(heard_k | x_k)`: `D11` in `x_{k-1}` twice, `D12` mixed, `D22` in `x_k` twice.
-///
-/// # Errors
-/// If `J + D11` is not positive definite.
-pub fn information_step<const D: usize>(
-    information: &SMatrix<f64, D, D>,
-    d11: &SMatrix<f64, D, D>,
-    d12: &SMatrix<f64, D, D>,
-    d22: &SMatrix<f64, D, D>,
-) -> Result<SMatrix<f64, D, D>, Error> {
-    let factor = Cholesky::new(information + d11).ok_or_else(|| {
-        ArgumentError::new("information", "J + D11 without a Cholesky factor", "a positive definite sum")
-    })?;
-    Ok(symmetrised(&(d22 - d12.transpose() * factor.solve(d12))))
 }

@@ -35,6 +35,7 @@
 //! ```
 //!
 //! Not in this crate: the scheme of any single paper, and time-varying models (pass another model at each step).
+#![warn(unreachable_pub)]
 
 mod backward_simulation;
 pub mod calibration;

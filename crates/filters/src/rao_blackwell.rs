@@ -2,9 +2,10 @@
 
 use crate::contract::{Info, StateFilter};
 use crate::particle::weigh;
-use crate::{Error, ResamplingRule, kalman};
+use crate::{Error, ResamplingRule};
 use fewbits_core::columns::{change_each, count, set_state, state_at};
 use fewbits_core::factor::Scalar;
+use fewbits_core::value_update;
 use fewbits_core::{Cell, FactoredGaussian, Gaussian, GaussianDynamics, Likelihood, LinearScalar};
 use fewbits_densities::GaussianCloud;
 use fewbits_numerics::error::{at_least_one, refuse};
@@ -166,7 +167,9 @@ pub fn impute<const D: usize, const M: usize, R: Rng + ?Sized>(
 ) -> Result<(), Error> {
     let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
     // One Kalman gain for all particles.
-    let (updated, info) = kalman::update_by(matrix, noise_covariance, &shared, &SVector::zeros())?;
+    let nothing = SVector::zeros();
+    let innovation = nothing - matrix * shared.mean();
+    let (updated, info) = value_update::update(matrix, noise_covariance, &shared, &nothing, innovation)?;
     let innovation = Gaussian::from_trusted_parts(SVector::zeros(), info.innovation_covariance)
         .factored()
         .map_err(|_| Error::SingularInnovation)?;

@@ -37,6 +37,7 @@
 //! ```
 //!
 //! Not in this crate: time-varying matrices, estimation.
+#![warn(unreachable_pub)]
 
 mod ar1;
 mod auto;

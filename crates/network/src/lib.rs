@@ -56,6 +56,7 @@
 //! ```
 //!
 //! Not here: estimators and filters (`fewbits-filters` and the crates of the schemes).
+#![warn(unreachable_pub)]
 
 mod clock;
 mod error;

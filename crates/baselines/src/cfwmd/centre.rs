@@ -7,8 +7,8 @@ use fewbits_cfwmd::no_feedback::advance;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion, Weighing};
 use fewbits_cfwmd::scheme::Censoring;
 use fewbits_core::{
-    BitReader, BitString, BitWriter, CodecError, Gaussian, LinearDynamics, LinearSensing, Message, NumberFormat,
-    Observation, Scheme, SensorNode,
+    BitReader, BitString, BitWriter, CodecError, Gaussian, Likelihood, LinearDynamics, LinearSensing, Message,
+    NumberFormat, Observation, Scheme, SensorNode,
 };
 use fewbits_filters::kalman;
 use fewbits_numerics::ArgumentError;
@@ -49,7 +49,7 @@ impl<const D: usize> Message for Broadcast<D> {
 /// Per slot the rules of all sensors. After the last entry its rules are used for all later slots.
 type Rules<const M: usize> = Arc<Vec<Vec<CensoringRule<M>>>>;
 
-/// Censoring sensors under [`Network::fuse_asked`]: CFwMD, CFwMD2 or a schedule. With threshold 0 every measurement is sent.
+/// Censoring sensors by [`Network::likelihoods`]: CFwMD, CFwMD2 or a schedule. With threshold 0 every measurement is sent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CensoringEstimator<G, S, const D: usize, const M: usize> {
     network: Network<S, D, M>,
@@ -185,7 +185,11 @@ where
             }
             _ => in_slot(&self.rules, slot)?,
         };
-        Ok(self.network.fuse_asked(predicted, rules, predicted.mean(), &all)?.0)
+        let mut belief = *predicted;
+        self.network
+            .likelihoods(rules, predicted.mean(), &all)?
+            .condition(&mut belief)?;
+        Ok(belief)
     }
 
     fn estimate(&self, belief: &Gaussian<D>) -> Vec<(f64, f64)> {

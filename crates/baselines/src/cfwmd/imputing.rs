@@ -1,12 +1,12 @@
 //! The fusion centre without feedback by particles: withheld measurements are drawn (imputed), and given them the belief is Gaussian.
 
 use fewbits_cfwmd::Error;
-use fewbits_cfwmd::network::{FusionInfo, Network};
+use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::no_feedback::{advance, check};
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_core::{FactoredGaussian, Gaussian, LinearDynamics, LinearSensing, Observation};
 use fewbits_densities::GaussianCloud;
-use fewbits_filters::{RaoBlackwellised, Resampling, ResamplingRule, Schedule, StateFilter};
+use fewbits_filters::{Info, RaoBlackwellised, Resampling, ResamplingRule, Schedule, StateFilter};
 use fewbits_numerics::{LogSum, normal};
 use nalgebra::SVector;
 use rand::{Rng, RngExt};
@@ -78,13 +78,13 @@ pub fn step<S, R, const D: usize, const M: usize>(
     dynamics: &impl LinearDynamics<D>,
     belief: &ImputedBelief<D>,
     observations: &[Observation<SVector<f64, M>>],
-) -> Result<(ImputedBelief<D>, FusionInfo), Error>
+) -> Result<(ImputedBelief<D>, Info), Error>
 where
     S: LinearSensing<D, M> + Clone + PartialEq,
     R: Rng + ?Sized,
 {
     check(network, observations)?;
-    let (mut next, mut info) = (belief.clone(), FusionInfo::default());
+    let (mut next, mut info, mut arrived) = (belief.clone(), Info::default(), 0_usize);
     let rule = ResamplingRule::new(Resampling::Systematic, Schedule::Below(0.5));
     RaoBlackwellised::new(rule, next.cloud.means().len())?.predict(&mut &mut *rng, dynamics, &mut next.cloud)?;
     for estimate in next.cloud.means_mut().parts_mut().1.chunks_exact_mut(D) {
@@ -123,7 +123,7 @@ where
                     (z, log_weight)
                 },
             )?;
-            info.received += usize::from(received);
+            arrived += usize::from(received);
             next.violations += usize::from(received && contradicted == log_weights.len());
         }
     }
@@ -133,8 +133,8 @@ where
             .for_each(|(log, increment)| *log += increment);
     })?;
     let lost = observations.iter().filter(|o| **o == Observation::Lost).count();
-    if info.received > 0 {
-        info.log_likelihood += info.received as f64 * link.of_received()?.ln();
+    if arrived > 0 {
+        info.log_likelihood += arrived as f64 * link.of_received()?.ln();
     }
     info.log_likelihood += increment + lost as f64 * link.lost_given_sent().ln();
     Ok((next, info))

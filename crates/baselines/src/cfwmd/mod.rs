@@ -2,15 +2,19 @@
 //! measurements imputed.
 
 pub mod centre;
+mod cross_covariance;
 pub mod imputing;
+mod particles;
 pub mod trigger;
 
+pub use cross_covariance::cross_covariance_step;
 pub use imputing::ImputedBelief;
+pub use particles::likelihood_of_particles;
 
 use fewbits_cfwmd::Error;
-use fewbits_cfwmd::network::{FusionInfo, Network};
+use fewbits_cfwmd::network::Network;
 use fewbits_core::{Gaussian, LinearSensing, Observation};
-use fewbits_filters::kalman;
+use fewbits_filters::{Info, kalman};
 use fewbits_numerics::error::entries;
 use nalgebra::SVector;
 
@@ -23,15 +27,14 @@ pub fn fuse_received<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize,
     network: &Network<S, D, M>,
     predicted: &Gaussian<D>,
     observations: &[Observation<SVector<f64, M>>],
-) -> Result<(Gaussian<D>, FusionInfo), Error> {
+) -> Result<(Gaussian<D>, Info), Error> {
     entries("observations", observations.len(), network.sensors().len())?;
-    let (mut belief, mut info) = (*predicted, FusionInfo::default());
+    let (mut belief, mut info) = (*predicted, Info::default());
     for (sensor, observation) in network.sensors().iter().zip(observations) {
         if let Observation::Received(value) = observation {
             let (next, update) = kalman::update(sensor, &belief, value)?;
             belief = next;
             info.log_likelihood += update.log_likelihood;
-            info.received += 1;
         }
     }
     Ok((belief, info))

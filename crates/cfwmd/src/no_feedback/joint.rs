@@ -2,11 +2,12 @@
 
 use super::{advance, check};
 use crate::Error;
-use crate::censored::Missing;
 use crate::ellipsoid::EllipsoidMoments;
-use crate::network::{FusionInfo, Network};
+use crate::missing::Missing;
+use crate::network::Network;
 use crate::rule::{CensoringRule, OwnRecursion, OwnStep};
 use fewbits_core::{Gaussian, LinearDynamics, LinearSensing, Observation};
+use fewbits_filters::Info;
 use fewbits_numerics::eigen::symmetric_eigen;
 use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
 use fewbits_numerics::normal::LN_SQRT_2PI;
@@ -237,9 +238,9 @@ pub fn step<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M:
     dynamics: &impl LinearDynamics<D>,
     belief: &JointBelief<D>,
     observations: &[Observation<SVector<f64, M>>],
-) -> Result<(JointBelief<D>, FusionInfo), Error> {
+) -> Result<(JointBelief<D>, Info), Error> {
     check(network, observations)?;
-    let (mut next, mut info) = (belief.clone(), FusionInfo::default());
+    let (mut next, mut info) = (belief.clone(), Info::default());
     let steps = advance(&mut next.own, network, dynamics)?;
     next.predict(dynamics)?;
     let link = network.link();
@@ -248,7 +249,6 @@ pub fn step<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M:
     for (i, ((sensor, step), observation)) in sensors() {
         if let Observation::Received(value) = observation {
             info.log_likelihood += link.of_received()?.ln() + next.receive(sensor, step, i, value)?;
-            info.received += 1;
         }
     }
     for (i, ((sensor, (step, rule)), observation)) in sensors() {

@@ -1,10 +1,11 @@
 //! Every entry of the reference values, computed by an independent program.
 
 use crate::Silence;
+use fewbits_baselines::cfwmd::cross_covariance_step;
 use fewbits_baselines::cfwmd::trigger::StochasticTrigger;
 use fewbits_cfwmd::ellipsoid::Ellipsoid;
 use fewbits_cfwmd::information::{Direction, divergence};
-use fewbits_cfwmd::rule::{OwnRecursion, OwnStep, cross_covariance_step};
+use fewbits_cfwmd::rule::{OwnRecursion, OwnStep};
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::{Factor, Gaussian};
 use fewbits_filters::kalman;

@@ -1,5 +1,6 @@
 //! Fusion with feedback: the Gaussian, the particle and the Rao-Blackwellised centre against each other and exact limits.
 
+use crate::Instant;
 use fewbits_baselines::cfwmd::fuse_received;
 use fewbits_cfwmd::Error;
 use fewbits_cfwmd::network::Network;
@@ -73,7 +74,6 @@ fn one_gaussian_update_has_the_exact_moments() {
         let likelihood = network.likelihood(&rules, &broadcast, &observations).unwrap();
         let (cloud, evidence) = referee(&belief, &likelihood);
         assert_close(&ours, info.log_likelihood, &cloud, evidence);
-        assert_eq!(info.received, 1);
 
         // One missing report of a vector sensor is exact; a second one meets a belief that is no longer quite Gaussian.
         let network = vector_network(loss);
@@ -264,14 +264,14 @@ fn the_evidence_of_values_is_their_joint_density() {
     for loss in [0.0, 0.3] {
         let arrival = 2.0 * f64::ln(1.0 - loss);
         let info = fuse(&network(loss, NumberFormat::Double)).unwrap();
-        assert!((info.log_likelihood - expected - arrival).abs() < 1e-12 && info.received == 2);
+        assert!((info.log_likelihood - expected - arrival).abs() < 1e-12);
         let cells = 2.0 * (64.0 / f64::from(1 << 16)).ln();
         let info = fuse(&network(loss, fine)).unwrap();
         assert!((info.log_likelihood - expected - arrival - cells).abs() < 1e-3, "{info:?}");
     }
     // The baseline takes densities and does not ask how often values arrive.
     let (_, info) = fuse_received(&network(0.3, NumberFormat::Double), &belief, &observations).unwrap();
-    assert!((info.log_likelihood - expected).abs() < 1e-12 && info.received == 2);
+    assert!((info.log_likelihood - expected).abs() < 1e-12);
 }
 
 #[test]

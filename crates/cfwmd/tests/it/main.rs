@@ -6,16 +6,61 @@
 mod centre;
 mod fixtures;
 mod fusion;
+mod groups;
 mod no_feedback;
 mod node;
 mod schemes;
 mod silence;
 mod wild;
 
+use fewbits_baselines::cfwmd::likelihood_of_particles;
+use fewbits_cfwmd::Error;
 use fewbits_cfwmd::censored::Censored;
+use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::CensoringRule;
-use fewbits_core::{Gaussian, Link, Tilted};
-use nalgebra::{Matrix1, Vector1};
+use fewbits_core::{Evidence, Gaussian, Likelihood, Link, Observation, Observed, Sensing, Tilted};
+use nalgebra::{Matrix1, SVector, Vector1};
+
+/// One instant of a network: a Gaussian updated by what was observed of all sensors, and the likelihood that weighs particles.
+trait Instant<S, const D: usize, const M: usize> {
+    fn fuse(
+        &self,
+        predicted: &Gaussian<D>,
+        rules: &[CensoringRule<M>],
+        broadcast: &SVector<f64, D>,
+        observations: &[Observation<SVector<f64, M>>],
+    ) -> Result<(Gaussian<D>, Evidence), Error>;
+
+    fn likelihood(
+        &self,
+        rules: &[CensoringRule<M>],
+        broadcast: &SVector<f64, D>,
+        observations: &[Observation<SVector<f64, M>>],
+    ) -> Result<Vec<Observed<S, Censored<M>, M>>, Error>;
+}
+
+impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Instant<S, D, M> for Network<S, D, M> {
+    fn fuse(
+        &self,
+        predicted: &Gaussian<D>,
+        rules: &[CensoringRule<M>],
+        broadcast: &SVector<f64, D>,
+        observations: &[Observation<SVector<f64, M>>],
+    ) -> Result<(Gaussian<D>, Evidence), Error> {
+        let (mut belief, all) = (*predicted, observations.iter().copied().map(Some).collect::<Vec<_>>());
+        let found = self.likelihoods(rules, broadcast, &all)?.condition(&mut belief)?;
+        Ok((belief, found))
+    }
+
+    fn likelihood(
+        &self,
+        rules: &[CensoringRule<M>],
+        broadcast: &SVector<f64, D>,
+        observations: &[Observation<SVector<f64, M>>],
+    ) -> Result<Vec<Observed<S, Censored<M>, M>>, Error> {
+        likelihood_of_particles(self, rules, broadcast, observations)
+    }
+}
 
 /// `count` identical silent scalar sensors: innovation within `half_width` of `centre`, noise variance, loss of the link.
 #[derive(Debug, Clone, Copy)]

@@ -1,5 +1,6 @@
 //! Fusion without feedback.
 
+use crate::Instant;
 use fewbits_baselines::cfwmd::{ImputedBelief, fuse_received, imputing};
 use fewbits_cfwmd::Error;
 use fewbits_cfwmd::network::Network;

@@ -1,5 +1,6 @@
 //! Every scheme obeys the laws of `Scheme`.
 
+use crate::Instant;
 use fewbits_baselines::cfwmd::trigger::{StochasticTrigger, Triggered};
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::no_feedback::LocalSensor;

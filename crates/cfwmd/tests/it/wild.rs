@@ -1,5 +1,6 @@
 //! Wild arguments: every constructor and step returns numbers or an error.
 
+use crate::Instant;
 use fewbits_baselines::cfwmd::fuse_received;
 use fewbits_baselines::cfwmd::trigger::{StochasticTrigger, Triggered};
 use fewbits_cfwmd::censored::{Censored, MissingReports};

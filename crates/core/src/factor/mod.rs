@@ -65,6 +65,12 @@ pub trait Factor<const M: usize>: Send + Sync {
     fn as_scalar(&self) -> Option<Scalar> {
         None
     }
+
+    /// The value `z`, its noise covariance `R` and the logarithm of a constant, if the factor is `N(z; m, R)` times the constant and a Gaussian
+    /// is to be updated by the Kalman filter in place of [`tilted`](Self::tilted): the same moments in less time.
+    fn as_value(&self) -> Option<(SVector<f64, M>, SMatrix<f64, M, M>, f64)> {
+        None
+    }
 }
 
 /// Adds transformed log likelihoods to `log_weights`, block by block. `add(means, logs)` adds the log likelihoods of a block to `logs`,

@@ -1,9 +1,10 @@
 //! Fusion centres of one-bit, three-bit and full sensors: health, learnt noise, late reports, stored states.
 
 use fewbits_core::{
-    Belief, Dynamics, FullValue, Gaussian, Link, MeasurementNoise, Observation, OnAxes, SchemeNode, Sensing, SensorNode,
+    Belief, BitString, Dynamics, FullValue, Gaussian, Link, MeasurementNoise, Observation, OnAxes, SchemeNode, Sensing,
+    SensorNode, Sign,
 };
-use fewbits_dymbo::{InnovationWord, Prediction, SignBit};
+use fewbits_dymbo::{CountFusion, InnovationWord, ParallelFilter, Prediction, ScalarPlant, SignBit};
 use fewbits_filters::centre::{CentreState, Event, FusionCentre, NoiseLearning, RemoteSensor, Reporting, Slot};
 use fewbits_filters::{BootstrapFilter, Error, GridFilter, Imm, MomentFilter, Particles, ResamplingRule, StateFilter};
 use fewbits_models::{ContinuousLinear, LinearSensor, PLANE_POSITION};
@@ -472,4 +473,41 @@ fn refused_calls_leave_the_centre_as_it_was() {
     assert_eq!(found.events, [Event::Rejected(2)]);
     assert_eq!((plane.centre.estimate(), plane.centre.rejected(2).unwrap()), (alone, 1));
     assert!(plane.centre.leave(2) && !plane.centre.leave(2) && plane.centre.feedback(2).is_err());
+}
+
+/// Bits of sensors that answered the same threshold are a count: the centre's update is that of the exact parallel filter.
+#[test]
+fn the_bits_of_a_group_are_one_count() {
+    let link = Link::flipping(0.1).unwrap();
+    let prior = Gaussian::scalar(0.3, 2.0).unwrap();
+    let bits = [true, true, false, true, true, true];
+    let run = |grouped: bool| {
+        let mut rng = Stream::new(1).rng();
+        let world = ContinuousLinear::random_walk(0.5).unwrap();
+        let mut centre = FusionCentre::new(&mut rng, world, MomentFilter, &prior).unwrap();
+        for number in 0..bits.len() as u32 {
+            let threshold = |_: &Gaussian<1>, m: &Gaussian<1>| m.mean()[0];
+            let scheme = SignBit::new(1.0).unwrap();
+            let sensor = Reporting::new(LinearSensor::direct(1.0).unwrap(), scheme, link, threshold);
+            centre
+                .join(number, if grouped { sensor.in_group(0) } else { sensor })
+                .unwrap();
+        }
+        let told = centre.feedback(0).unwrap();
+        let report = |above: bool| BitString::from_bytes(vec![if above { 0x80 } else { 0 }], 1).unwrap();
+        let slot = |(number, above)| Slot::new(number, told.clone(), Observation::Received(report(above)));
+        let slots: Vec<Slot> = (0..).zip(bits).map(slot).collect();
+        let info = centre.receive(&mut rng, &slots).unwrap().info;
+        (centre.estimate(), info.log_likelihood)
+    };
+    let plant = ScalarPlant::new(1.0, 0.5, 1.0).unwrap();
+    let exact = ParallelFilter::new(plant, bits.len(), CountFusion::Exact).unwrap();
+    let sent = bits.map(|above| Observation::Received(if above { Sign::Above } else { Sign::Below }));
+    let (expected, info) = exact.with_link(link).update(&prior, &sent).unwrap();
+    let (found, log_likelihood) = run(true);
+    assert!((found.mean() - expected.mean()).amax() < 1e-9, "{} {}", found.mean(), expected.mean());
+    assert!((found.covariance() - expected.covariance()).amax() < 1e-9);
+    assert!((log_likelihood - info.log_likelihood).abs() < 1e-9);
+    // One after the other is an approximation.
+    assert!((run(false).0.covariance() - expected.covariance()).amax() > 1e-5);
 }

@@ -5,14 +5,14 @@ use super::setting::{Linear, Setting};
 use super::world::{At, Centre, Draws, Known, Named, World};
 use crate::prelude::*;
 use fewbits_baselines::cfwmd::trigger::{StochasticTrigger, Triggered};
-use fewbits_baselines::cfwmd::{ImputedBelief, fuse_received, imputing};
+use fewbits_baselines::cfwmd::{ImputedBelief, fuse_received, imputing, likelihood_of_particles};
 use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::no_feedback::{JointBelief, LocalSensor, joint};
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion, OwnStep, Weighing};
 use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{NumberFormat, Scheme as _};
+use fewbits_core::{Likelihood, NumberFormat, Scheme as _};
 use fewbits_densities::Particles;
 use fewbits_filters::{BootstrapFilter, Resampling, ResamplingRule, Schedule, StateFilter, assumed_density, kalman};
 use fewbits_models::{LinearGaussian, LinearSensor, constant_velocity_1d};
@@ -207,7 +207,11 @@ impl<const M: usize> Line<M> {
             let predicted = kalman::predict(&self.dynamics, &belief);
             let rules = self.rules(k, weighing, &network, &predicted)?;
             let (observations, sent) = self.observe(k, draws, &rules, predicted.mean(), loss);
-            belief = network.fuse(&predicted, &rules, predicted.mean(), &observations)?.0;
+            let observed: Vec<_> = observations.into_iter().map(Some).collect();
+            belief = predicted;
+            network
+                .likelihoods(&rules, predicted.mean(), &observed)?
+                .condition(&mut belief)?;
             Ok(Known::of(&belief, sent))
         }))
     }
@@ -236,7 +240,7 @@ impl<const M: usize> Line<M> {
             let predicted = moments(&cloud);
             let rules = self.rules(k, weighing, &network, &predicted)?;
             let (observations, sent) = self.observe(k, draws, &rules, predicted.mean(), 0.0);
-            let likelihood = network.likelihood(&rules, predicted.mean(), &observations)?;
+            let likelihood = likelihood_of_particles(&network, &rules, predicted.mean(), &observations)?;
             filter.update(&mut rng, &mut cloud, &[&likelihood])?;
             Ok(Known::of(&moments(&cloud), sent))
         }))

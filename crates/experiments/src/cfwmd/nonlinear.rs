@@ -4,6 +4,7 @@ use super::rows::Ensemble;
 use super::setting::{Field, Setting};
 use super::world::{At, Centre, Draws, Known, Named, World};
 use crate::prelude::*;
+use fewbits_baselines::cfwmd::likelihood_of_particles;
 use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
@@ -102,7 +103,9 @@ impl World<4, 1> for Plane {
                 rules.push(rule);
             }
             let likelihood = match scheme {
-                Scheme::State | Scheme::StateAndCovariance => network.likelihood(&rules, &expected, &observations)?,
+                Scheme::State | Scheme::StateAndCovariance => {
+                    likelihood_of_particles(&network, &rules, &expected, &observations)?
+                }
                 // A filter that ignores silence takes it for no observation.
                 Scheme::All | Scheme::Random | Scheme::Ignored => {
                     let sensors = self.sensors.iter().zip(&observations);

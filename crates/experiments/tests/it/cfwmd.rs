@@ -6,7 +6,7 @@ use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::threshold::{Budget, threshold};
 use fewbits_core::factor::{self, Levels, Scalar};
-use fewbits_core::{Cell, Dynamics, Gaussian, Link, Observed, Sensing};
+use fewbits_core::{Cell, Dynamics, Gaussian, Likelihood, Link, Observed, Sensing};
 use fewbits_densities::GaussianCloud;
 use fewbits_experiments::schema::Value;
 use fewbits_experiments::{Context, Measured, all};
@@ -112,7 +112,10 @@ fn run(particles: usize, stream: Stream) -> [f64; 3] {
             }
             cloud.gaussian()
         } else {
-            network.fuse(&predicted, &rules, &broadcast, &observations).unwrap().0
+            let (mut next, observed) = (predicted, observations.into_iter().map(Some).collect::<Vec<_>>());
+            let all = network.likelihoods(&rules, &broadcast, &observed).unwrap();
+            all.condition(&mut next).unwrap();
+            next
         };
         let error = truth - belief.mean();
         let now = [error[0] * error[0], error[1] * error[1], sent as f64];

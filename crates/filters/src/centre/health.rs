@@ -50,7 +50,7 @@ pub(super) struct Residual {
 impl Residual {
     /// Residual of a bit of probability `share`, from the sign of its correction. The other bit has the remaining probability, and the mean
     /// correction is zero. `None` if only one outcome is possible.
-    pub fn of_bit(share: f64, correction: f64) -> Option<Self> {
+    pub(crate) fn of_bit(share: f64, correction: f64) -> Option<Self> {
         let other = (1.0 - share).max(f64::MIN_POSITIVE);
         // A variable of mean zero with two values and probabilities `share` and `other` has deviation one if this is its size at `share`.
         let size = (other / share).sqrt();
@@ -70,7 +70,7 @@ impl Residual {
 
     /// Residual of a word, from `(ln p, correction)` of every possible word; `at` is the index of the received one. `None` if only one is
     /// possible.
-    pub fn of_word(words: &[(f64, f64)], at: usize) -> Option<Self> {
+    pub(crate) fn of_word(words: &[(f64, f64)], at: usize) -> Option<Self> {
         let total: f64 = words.iter().map(|w| w.0.exp()).sum();
         let shares: Vec<f64> = words.iter().map(|w| w.0.exp() / total).collect();
         let possible = || shares.iter().zip(words).filter(|(share, _)| **share > 0.0);
@@ -99,14 +99,14 @@ impl Residual {
     }
 
     /// Residual of a value, from `ln` of its density, the variance of the innovation, and the sign of the correction.
-    pub fn of_value(log_density: f64, variance: f64, correction: f64) -> Option<Self> {
+    pub(crate) fn of_value(log_density: f64, variance: f64, correction: f64) -> Option<Self> {
         // -2 ln N(innovation; 0, S) = innovation^2 / S + ln(2 pi S); rounding may leave a negative rest.
         let nis = (-2.0 * log_density - (std::f64::consts::TAU * variance).ln()).max(0.0);
         Self::of_normal(nis.sqrt().copysign(correction))
     }
 
     /// Residual of a cell, from `ln` of its probability beside the likeliest cell's and the sign of the correction. `None` if it is not improbable.
-    pub fn of_cell(log_ratio: f64, correction: f64) -> Option<Self> {
+    pub(crate) fn of_cell(log_ratio: f64, correction: f64) -> Option<Self> {
         if log_ratio > IMPROBABLE {
             return None;
         }
@@ -114,7 +114,7 @@ impl Residual {
     }
 
     /// Residual of a variable that is standard normal if the model is right. `None` if it is not finite.
-    pub fn of_normal(residual: f64) -> Option<Self> {
+    pub(crate) fn of_normal(residual: f64) -> Option<Self> {
         let nis = residual * residual;
         nis.is_finite().then(|| Self {
             surprise: (nis - 1.0) * std::f64::consts::FRAC_1_SQRT_2,
@@ -239,7 +239,7 @@ pub(super) struct Limits {
 }
 
 impl Limits {
-    pub fn new(rates: &FalseAlarms) -> Self {
+    pub(crate) fn new(rates: &FalseAlarms) -> Self {
         Self {
             sensor: SumLimits::new(rates.sensor / SUMS as f64),
             // Residuals have no part in it.
@@ -276,7 +276,7 @@ pub(super) struct Monitor {
 
 impl Monitor {
     /// Adds one term to each sequence that has one: surprise, residual, product.
-    pub fn add(&mut self, terms: [Option<f64>; SEQUENCES], limits: &SumLimits) -> Option<Alarm> {
+    pub(crate) fn add(&mut self, terms: [Option<f64>; SEQUENCES], limits: &SumLimits) -> Option<Alarm> {
         let [surprise, residual, product] = &mut self.sums;
         let sums = [
             (surprise, terms[0], limits.small, Alarm::Overstatement),
@@ -300,7 +300,7 @@ impl Monitor {
     }
 
     /// The largest sum that speaks for a contradiction, in parts of its limit.
-    pub fn contradiction(&self, limits: &SumLimits) -> f64 {
+    pub(crate) fn contradiction(&self, limits: &SumLimits) -> f64 {
         let ([surprise, residual, product], large) = (&self.sums, &self.large);
         let small = surprise.up.max(residual.up).max(residual.down).max(product.up) / limits.small.limit;
         small.max(large.up.max(large.down) / limits.large.limit)

@@ -86,22 +86,25 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         belief: &mut F::Belief,
         slots: &mut [StoredSlot],
     ) -> Result<(), Error> {
-        let (mut reports, mut contested, mut missing) = (Vec::new(), Vec::new(), Vec::new());
-        for slot in slots.iter() {
+        let plain: Vec<Slot> = slots.iter().map(StoredSlot::slot).collect();
+        let mut contested = Vec::new();
+        let (mut reports, mut silent) = (Vec::new(), Vec::new());
+        for (slot, plain) in slots.iter().zip(&plain) {
             // A sensor may have left in the meantime.
-            let Ok(member) = self.member(slot.sensor) else { continue };
-            if !slot.used && slot.log_wrong.is_none() {
+            let Ok(seat) = self.seated(slot.sensor, 0) else {
                 continue;
-            }
-            let plain = slot.slot();
-            let likelihood = member.sensor.likelihood(&plain, slot.working)?;
+            };
             match (slot.log_wrong, plain.observation == Observation::Nothing) {
-                (Some(log_wrong), _) => contested.push((likelihood, log_wrong)),
-                (None, true) if likelihood.as_constant() == Some(f64::NEG_INFINITY) => {}
-                (None, true) => missing.push(likelihood),
-                (None, false) => reports.push(likelihood),
+                (None, _) if !slot.used => {}
+                (Some(log_wrong), _) => {
+                    contested.push((self.members[seat].sensor.likelihood(plain, slot.working)?, log_wrong));
+                }
+                (None, true) => silent.push((seat, plain, slot.working)),
+                (None, false) => reports.push((seat, plain, slot.working)),
             }
         }
+        let (reports, mut missing) = (self.all_of(&reports)?, self.all_of(&silent)?);
+        missing.retain(|one| one.as_constant() != Some(f64::NEG_INFINITY));
         let parts: Vec<_> = contested.iter().map(|(one, log_wrong)| (&**one, *log_wrong)).collect();
         let wrong = (!parts.is_empty()).then(|| OneIsWrong::new(parts));
         let wrong = wrong.iter().map(|one| one as &dyn Likelihood<D>);
@@ -128,10 +131,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     }
 
     pub(super) fn stored(&self, reading: &Reading<'_, D>, verdict: &Verdict) -> StoredSlot {
-        let working = match reading.content {
-            Content::Nothing => self.members[reading.seat].state.presence.working,
-            Content::Lost | Content::Report => 1.0,
-        };
+        let (_, _, working) = self.input_of(reading);
         let log_wrong = match verdict.fate {
             Fate::Contested(log_wrong) => Some(log_wrong),
             _ => None,

@@ -7,7 +7,7 @@ use fewbits_numerics::error::{non_negative, positive, refuse};
 ///
 /// Residuals of a right model are independent. If `Q` is too small they repeat their sign; if it is too large they alternate. Learning
 /// takes no extra bits and works even with one bit per sample. If a signal alternates between bursts and rests, one scale is not enough;
-/// use a [`NoiseBank`](crate::NoiseBank).
+/// use an [`Imm`](crate::Imm).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseLearning {

@@ -37,6 +37,7 @@ mod receive;
 mod remote;
 mod slot;
 mod state;
+mod together;
 mod window;
 
 pub use health::{FalseAlarms, Health};
@@ -60,6 +61,7 @@ struct Member<const D: usize> {
     arrival: f64,
     /// Whether the sensor is never silent: a missing report was then lost on the link.
     always_speaks: bool,
+    group: Option<u32>,
     state: MemberState,
 }
 
@@ -200,6 +202,20 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// # Errors
     /// As [`join`](Self::join).
     pub fn join_boxed(&mut self, number: u32, sensor: Box<dyn RemoteSensor<D>>) -> Result<(), Error> {
+        self.seat_with(number, sensor, MemberState::new())
+    }
+
+    /// Replaces the scheme of a sensor that has joined, by that of the next slot for example. What the centre knows of the sensor's presence and
+    /// health is kept.
+    ///
+    /// # Errors
+    /// If there is no such sensor; as [`join`](Self::join).
+    pub fn renew(&mut self, number: u32, sensor: impl RemoteSensor<D> + 'static) -> Result<(), Error> {
+        let state = self.member(number)?.state;
+        self.seat_with(number, Box::new(sensor), state)
+    }
+
+    fn seat_with(&mut self, number: u32, sensor: Box<dyn RemoteSensor<D>>, state: MemberState) -> Result<(), Error> {
         // The feedback is computed here, so that a sensor whose models state different noise is refused now and not at its first report.
         let silent = Slot::new(number, sensor.feedback(&self.estimate())?, Observation::Nothing);
         let nothing = sensor.likelihood(&silent, 1.0);
@@ -207,8 +223,9 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             number,
             arrival: sensor.arrival(),
             always_speaks: nothing.is_ok_and(|one| one.as_constant().is_some()),
+            group: sensor.group(),
             sensor,
-            state: MemberState::new(),
+            state,
         };
         match self.seat(number, 0) {
             Ok(seat) => self.members[seat] = member,

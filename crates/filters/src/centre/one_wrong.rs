@@ -16,7 +16,7 @@ pub(super) struct OneIsWrong<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> OneIsWrong<'a, D> {
-    pub fn new(parts: Vec<(&'a dyn Likelihood<D>, f64)>) -> Self {
+    pub(crate) fn new(parts: Vec<(&'a dyn Likelihood<D>, f64)>) -> Self {
         Self { parts }
     }
 

@@ -65,7 +65,7 @@ pub(super) struct Presence {
 }
 
 impl Presence {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             working: 1.0,
             alone: 1.0,
@@ -77,7 +77,7 @@ impl Presence {
 
     /// Updates after nothing arrived, which has probability `silence` if the sensor works. Returns `ln` of the likelihood ratio of a common
     /// failure against none, and whether the sensor is declared dead now.
-    pub fn silent(&mut self, silence: f64, failures: &Failures) -> (f64, bool) {
+    pub(crate) fn silent(&mut self, silence: f64, failures: &Failures) -> (f64, bool) {
         let evidence = |works: &mut f64| {
             let alive = *works * silence;
             let total = alive + 1.0 - *works;
@@ -96,7 +96,7 @@ impl Presence {
 
     /// Updates after a report arrived. Returns `ln` of the likelihood ratio of a common failure against none, and whether the sensor had
     /// been declared dead.
-    pub fn report_arrived(&mut self) -> (f64, bool) {
+    pub(crate) fn report_arrived(&mut self) -> (f64, bool) {
         let ratio = self.struck.max(f64::MIN_POSITIVE) / self.alone.max(f64::MIN_POSITIVE);
         let ratio = if ratio == 1.0 { 0.0 } else { ratio.ln() };
         let news = self.named_dead;
@@ -121,7 +121,12 @@ fn mixed(common: f64, sensor: &Presence) -> f64 {
 }
 
 impl Outage {
-    pub fn advance<'a>(&mut self, seconds: f64, failures: &Failures, sensors: impl Iterator<Item = &'a mut Presence>) {
+    pub(crate) fn advance<'a>(
+        &mut self,
+        seconds: f64,
+        failures: &Failures,
+        sensors: impl Iterator<Item = &'a mut Presence>,
+    ) {
         let survives = (-failures.rate * seconds).exp();
         let new = (1.0 - self.0) * (1.0 - survives);
         let total = self.0 + new;
@@ -137,7 +142,7 @@ impl Outage {
     }
 
     /// Updates with the sum of the log likelihood ratios of all sensors of one instant.
-    pub fn weigh<'a>(&mut self, log_ratio: f64, sensors: impl Iterator<Item = &'a mut Presence>) {
+    pub(crate) fn weigh<'a>(&mut self, log_ratio: f64, sensors: impl Iterator<Item = &'a mut Presence>) {
         // The log odds are limited so that the probability differs from 0 and 1.
         let odds = ((self.0 / (1.0 - self.0)).ln() + log_ratio).clamp(-700.0, 700.0).exp();
         self.0 = odds / (1.0 + odds);

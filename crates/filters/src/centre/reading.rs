@@ -32,7 +32,7 @@ pub(super) enum Content {
 
 impl<'a, const D: usize> Reading<'a, D> {
     /// The likelihood of a reading that is known to have one.
-    pub fn known(&self) -> Option<&dyn Likelihood<D>> {
+    pub(crate) fn known(&self) -> Option<&dyn Likelihood<D>> {
         self.likelihood.as_deref()
     }
 }
@@ -47,7 +47,7 @@ pub(super) struct Tested {
 
 impl Tested {
     /// Probability of a report that is at most as likely.
-    pub fn tail(&self) -> f64 {
+    pub(crate) fn tail(&self) -> f64 {
         match self.residual {
             _ if !self.is_possible => 0.0,
             Some(residual) => residual.tail,
@@ -56,7 +56,7 @@ impl Tested {
     }
 
     /// How far the report is below the likeliest one, in nats; infinite if it is impossible.
-    pub fn depth(&self) -> f64 {
+    pub(crate) fn depth(&self) -> f64 {
         match self.residual {
             _ if !self.is_possible => f64::INFINITY,
             Some(residual) => residual.depth,

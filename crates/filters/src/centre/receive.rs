@@ -48,7 +48,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         }
         let before = (self.window > 0.0).then(|| belief.clone());
         let in_order = self.take_in_order(&law, &predicted, &readings, &mut verdicts)?;
-        let mut info = self.update_belief(rng, &mut belief, &readings, &mut verdicts, &in_order)?;
+        let mut info = self.update_belief(rng, &mut belief, &predicted, &readings, &mut verdicts, &in_order)?;
         let sent = readings.iter().filter(|reading| reading.content != Content::Nothing);
         info.log_likelihood += sent
             .map(|reading| self.members[reading.seat].state.presence.working)
@@ -145,6 +145,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             shown: Vec::with_capacity(readings.len()),
         };
         let mut before: Vec<&Reading<'_, D>> = Vec::new();
+        let mut silence = None;
         // A report that is the only one was tested given the prediction alone.
         let mut used = readings
             .iter()
@@ -161,7 +162,16 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                         None => member.silence(reading, predicted)?,
                     })
                 }
-                (Law::Moments(_), Content::Nothing, _) => Shown::Silence(member.silence(reading, predicted)?),
+                (Law::Moments(_), Content::Nothing, _) => {
+                    // Silent sensors of a group that were told the same are silent with the same probability.
+                    let same = silence.filter(|(one, _): &(&Reading<'_, D>, f64)| self.is_like(one, reading));
+                    let probability = match same {
+                        Some((_, probability)) => probability,
+                        None => member.silence(reading, predicted)?,
+                    };
+                    silence = Some((reading, probability));
+                    Shown::Silence(probability)
+                }
                 (Law::Points(_) | Law::Mixture(_), _, Some(_)) if verdict.fate == Fate::Used => {
                     let tested = is_tested.then(|| match is_only {
                         true => verdict.tested,
@@ -204,26 +214,44 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         &mut self,
         rng: &mut dyn Rng,
         belief: &mut F::Belief,
+        predicted: &Gaussian<D>,
         readings: &[Reading<'_, D>],
         verdicts: &mut [Verdict],
         in_order: &InOrder<D>,
     ) -> Result<Info, Error> {
         let contested = contested(readings, verdicts);
-        let missing = readings
+        let silent: Vec<&Reading<'_, D>> = readings
             .iter()
             .zip(&*verdicts)
-            .filter(|(reading, verdict)| reading.content == Content::Nothing && verdict.fate == Fate::Used);
+            .filter(|(reading, verdict)| reading.content == Content::Nothing && verdict.fate == Fate::Used)
+            .map(|(reading, _)| reading)
+            .collect();
+        let parts = self.joined(silent.iter().map(|one| self.input_of(one)))?;
         // An impossible silence shows that the sensor failed, and nothing about the state.
-        let missing = missing
-            .filter_map(|(reading, _)| reading.known())
+        let missing = self
+            .likelihoods(&silent, &parts)
+            .into_iter()
             .filter(|known| known.as_constant() != Some(f64::NEG_INFINITY));
         let rest: Vec<&dyn Likelihood<D>> = contested
             .iter()
             .map(|one| one as &dyn Likelihood<D>)
             .chain(missing)
             .collect();
+        let is_used = |i: &usize| verdicts[*i].fate == Fate::Used && readings[*i].content != Content::Nothing;
+        let mut reports: Vec<usize> = (0..readings.len()).filter(is_used).collect();
+        let used: Vec<&Reading<'_, D>> = reports.iter().map(|i| &readings[*i]).collect();
+        let parts_of_reports = self.joined(used.iter().map(|one| self.input_of(one)))?;
+        let together = self.likelihoods(&used, &parts_of_reports);
         if self.filter.of_moments(&in_order.given).is_some() {
             let (mut moments, mut log_likelihood) = (in_order.given, in_order.log_likelihood);
+            // The reports of a group, at once in place of one after the other.
+            let mut all = *predicted;
+            if !parts_of_reports.is_empty()
+                && let Ok(found) = together.as_slice().condition(&mut all)
+                && all.is_finite()
+            {
+                (moments, log_likelihood) = (all, found.log_likelihood);
+            }
             for one in rest {
                 // A constant likelihood changes no moments.
                 log_likelihood += match one.as_constant() {
@@ -236,13 +264,12 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             }
             return Ok(Info::new(log_likelihood));
         }
-        let is_used = |i: &usize| verdicts[*i].fate == Fate::Used && readings[*i].content != Content::Nothing;
-        let mut reports: Vec<usize> = (0..readings.len()).filter(is_used).collect();
         let all = |reports: &[usize]| {
             let reports = reports.iter().filter_map(|i| readings[*i].known());
             reports.chain(rest.iter().copied()).collect::<Vec<_>>()
         };
-        match self.filter.update(rng, belief, &all(&reports)) {
+        let at_once: Vec<&dyn Likelihood<D>> = together.iter().chain(&rest).copied().collect();
+        match self.filter.update(rng, belief, &at_once) {
             Err(error) if is_of_reports(&error) => {}
             other => return other,
         }

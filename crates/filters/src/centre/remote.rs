@@ -2,8 +2,11 @@
 
 use super::Slot;
 use crate::Error;
+use fewbits_core::columns::lengths_agree;
+use fewbits_core::factor::{Product, Repeated, Scalar};
 use fewbits_core::{
-    BitString, Evidence, Gaussian, Likelihood, Link, MeasurementNoise, Message, Observation, Observed, Scheme, Sensing,
+    BitString, Columns, Evidence, Factor, Gaussian, Likelihood, Link, MeasurementNoise, Message, Observation, Observed,
+    Scheme, Sensing, Tilted,
 };
 use fewbits_numerics::error::{ArgumentError, within};
 use fewbits_numerics::linalg::congruence;
@@ -59,6 +62,21 @@ pub trait RemoteSensor<const D: usize>: Send + Sync {
         true
     }
 
+    /// The group of this sensor: sensors of a group have the same sensing model, scheme and link. What those that were told the same observed at
+    /// one instant is then one likelihood, [`together`](Self::together). `None`: the sensor is alone.
+    fn group(&self) -> Option<u32> {
+        None
+    }
+
+    /// The likelihood of the observations of several sensors of the group, each with the number of sensors that it is of: all silent, or all
+    /// reports. `None`: one after the other.
+    ///
+    /// # Errors
+    /// As [`likelihood`](Self::likelihood).
+    fn together(&self, _counted: &[(&Slot, usize)], _working: f64) -> Result<Option<Box<dyn Likelihood<D>>>, Error> {
+        Ok(None)
+    }
+
     /// First coordinate of the noise-free measurement of `state`, if it is known. A centre needs it to test reports by a belief of points.
     fn measured(&self, _state: &SVector<f64, D>) -> Option<f64> {
         None
@@ -87,6 +105,7 @@ pub struct Reporting<S, C, A, const M: usize> {
     ask: A,
     sends_values: bool,
     tests: Option<fn(&BitString) -> Option<ReportTest>>,
+    group: Option<u32>,
 }
 
 /// Relative difference between the noise of sensing model and scheme that is treated as rounding.
@@ -102,6 +121,17 @@ impl<S, C, A, const M: usize> Reporting<S, C, A, M> {
             ask,
             sends_values: false,
             tests: None,
+            group: None,
+        }
+    }
+
+    /// The same sensor in a group: all its sensors are made of the same sensing model, scheme and link. The words, bits or silences of scalar
+    /// measurements of those that were told the same update a belief as one factor, at a cost that does not grow with their number.
+    #[must_use]
+    pub fn in_group(self, group: u32) -> Self {
+        Self {
+            group: Some(group),
+            ..self
         }
     }
 
@@ -237,8 +267,61 @@ where
         C::Report::from_bits(&self.scheme.report_format(), report).is_ok()
     }
 
+    fn group(&self) -> Option<u32> {
+        self.group
+    }
+
+    fn together(&self, counted: &[(&Slot, usize)], working: f64) -> Result<Option<Box<dyn Likelihood<D>>>, Error> {
+        let (mut product, mut log_scale) = (Product::new(), 0.0);
+        for (slot, count) in counted {
+            let factor = self.observed(slot, working)?.factor.as_scalar();
+            // Values are exact one after the other.
+            let Some((scalar, log)) = factor.filter(|(scalar, _)| M == 1 && !matches!(scalar, Scalar::Value(_))) else {
+                return Ok(None);
+            };
+            log_scale += *count as f64 * log;
+            match scalar {
+                Scalar::Constant(one) => log_scale += *count as f64 * one.probability().ln(),
+                other => product.push_repeated(Repeated::new(other, *count)?),
+            }
+        }
+        if product.factors().is_empty() {
+            return Ok(None);
+        }
+        Ok(Some(Box::new(Observed::new(self.sensing.clone(), Joint { product, log_scale }))))
+    }
+
     fn measured(&self, state: &SVector<f64, D>) -> Option<f64> {
         self.sensing.mean(state).iter().next().copied()
+    }
+}
+
+/// A product of factors of the one component of a measurement (`M` is 1), times a constant.
+struct Joint {
+    product: Product,
+    log_scale: f64,
+}
+
+impl<const M: usize> Factor<M> for Joint {
+    fn log_likelihood(&self, m: &SVector<f64, M>) -> f64 {
+        self.log_scale + self.product.log_likelihood(&[m[0]].into())
+    }
+
+    fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
+        if lengths_agree(means, log_weights) {
+            log_weights.iter_mut().for_each(|w| *w += self.log_scale);
+            self.product.add_log_likelihoods(&[means[0]], log_weights);
+        }
+    }
+
+    fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
+        let first = Gaussian::from_trusted_parts([prior.mean()[0]].into(), [[prior.covariance()[(0, 0)]]].into());
+        let found = self.product.tilted(&first)?;
+        Ok(Tilted {
+            log_evidence: found.log_evidence + self.log_scale,
+            mean: SVector::repeat(found.mean[0]),
+            covariance: SMatrix::repeat(found.covariance[0]),
+        })
     }
 }
 

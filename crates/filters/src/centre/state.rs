@@ -41,7 +41,7 @@ pub(super) struct MemberState {
 }
 
 impl MemberState {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             presence: Presence::new(),
             monitor: Monitor::default(),
@@ -58,7 +58,7 @@ impl MemberState {
     }
 
     /// Forgets what was found against a prediction or a set of sensors that is no longer in use.
-    pub fn forget_tests(&mut self) {
+    pub(crate) fn forget_tests(&mut self) {
         self.monitor = Monitor::default();
         (self.last_residual, self.last_in_order) = (None, None);
         (self.disputed, self.depth, self.astray) = (false, 0.0, 0);
@@ -91,7 +91,7 @@ pub(super) struct StoredSlot {
 }
 
 impl StoredSlot {
-    pub fn new(slot: &Slot, working: f64, used: bool, log_wrong: Option<f64>) -> Self {
+    pub(crate) fn new(slot: &Slot, working: f64, used: bool, log_wrong: Option<f64>) -> Self {
         Self {
             sensor: slot.sensor,
             feedback: slot.feedback.clone(),
@@ -103,18 +103,18 @@ impl StoredSlot {
     }
 
     /// A report is not used from now on.
-    pub fn drop_report(&mut self) {
+    pub(crate) fn drop_report(&mut self) {
         if self.observation != Observation::Nothing {
             (self.used, self.log_wrong) = (false, None);
         }
     }
 
     /// Whether this is a report that says the same as `slot`.
-    pub fn is_copied_by(&self, slot: &Slot) -> bool {
+    pub(crate) fn is_copied_by(&self, slot: &Slot) -> bool {
         self.sensor == slot.sensor && self.feedback == slot.feedback && self.observation == slot.observation
     }
 
-    pub fn slot(&self) -> Slot {
+    pub(crate) fn slot(&self) -> Slot {
         Slot::new(self.sensor, self.feedback.clone(), self.observation.clone())
     }
 }

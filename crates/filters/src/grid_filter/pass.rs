@@ -62,7 +62,7 @@ impl<const K: usize> Found<K> {
     /// Nodes per deviation of the posterior: the smaller of the number along the shortest principal axis and the number from the effective
     /// nodes. A posterior with edges, ridges or spikes has fewer effective nodes than a Gaussian of its moments. 0 if the weights are
     /// tempered.
-    pub fn nodes_per_deviation(&self) -> f64 {
+    pub(crate) fn nodes_per_deviation(&self) -> f64 {
         if self.is_tempered() {
             0.0
         } else {
@@ -71,21 +71,21 @@ impl<const K: usize> Found<K> {
     }
 
     /// Whether more nodes are needed. If not, a grid along the principal axes is enough.
-    pub fn is_coarse(&self) -> bool {
+    pub(crate) fn is_coarse(&self) -> bool {
         self.is_tempered() || self.counted < MIN_NODES_PER_DEVIATION
     }
 
     /// Whether the evidence of this region is certainly below `exp(-log_ratio)` times the given evidence.
-    pub fn is_below(&self, region: &Region<K>, log_evidence: f64, log_ratio: f64) -> bool {
+    pub(crate) fn is_below(&self, region: &Region<K>, log_evidence: f64, log_ratio: f64) -> bool {
         !self.is_tempered() && self.log_evidence + region.log_volume() < log_evidence - log_ratio
     }
 
-    pub fn is_tempered(&self) -> bool {
+    pub(crate) fn is_tempered(&self) -> bool {
         self.exponent < 1.0
     }
 
     /// Whether the moments are those of the posterior: resolved and inside the grid.
-    pub fn is_done(&self, region: &Region<K>, reach: f64) -> bool {
+    pub(crate) fn is_done(&self, region: &Region<K>, reach: f64) -> bool {
         let widest = self.covariance.diagonal().max().sqrt();
         let covered = match region.is_prediction {
             true if widest >= BLUNT => 1.0,
@@ -97,11 +97,11 @@ impl<const K: usize> Found<K> {
     }
 
     /// Whether the next grid would be as wide as this one.
-    pub fn is_stalled(&self) -> bool {
+    pub(crate) fn is_stalled(&self) -> bool {
         self.shortest > STALLED
     }
 
-    pub fn piece(&self, region: &Region<K>) -> Piece<K> {
+    pub(crate) fn piece(&self, region: &Region<K>) -> Piece<K> {
         let (mean, covariance) = region.moments(&self.mean, &self.covariance);
         let impossible = self.log_peak < UNDERFLOW;
         Piece {

@@ -51,7 +51,7 @@ pub(super) struct Piece<const K: usize> {
 
 impl<const K: usize> Region<K> {
     /// The region of the whole prediction.
-    pub fn whole(nodes: usize) -> Self {
+    pub(crate) fn whole(nodes: usize) -> Self {
         let nothing = Cut {
             normal: SVector::zeros(),
             offset: 0.0,
@@ -70,29 +70,29 @@ impl<const K: usize> Region<K> {
 
     /// Whether `u` is in this region.
     #[inline]
-    pub fn holds(&self, u: &SVector<f64, K>) -> bool {
+    pub(crate) fn holds(&self, u: &SVector<f64, K>) -> bool {
         self.cuts[..self.depth]
             .iter()
             .all(|cut| cut.normal.dot(u) >= cut.offset)
     }
 
     /// `ln` of the volume in `u` of a unit cube of grid coordinates.
-    pub fn log_volume(&self) -> f64 {
+    pub(crate) fn log_volume(&self) -> f64 {
         self.deviations.iter().map(|d| d.ln()).sum()
     }
 
     /// Whether another split is possible.
-    pub fn can_split(&self) -> bool {
+    pub(crate) fn can_split(&self) -> bool {
         self.depth < MAX_CUTS
     }
 
     /// Matrix from grid coordinates to `u`.
-    pub fn basis(&self) -> SMatrix<f64, K, K> {
+    pub(crate) fn basis(&self) -> SMatrix<f64, K, K> {
         SMatrix::from_fn(|i, j| self.axes[(i, j)] * self.deviations[j])
     }
 
     /// Moments of `u` from those of the grid coordinates.
-    pub fn moments(
+    pub(crate) fn moments(
         &self,
         mean: &SVector<f64, K>,
         covariance: &SMatrix<f64, K, K>,
@@ -103,7 +103,7 @@ impl<const K: usize> Region<K> {
 
     /// The next grid, along the principal axes of what was found. If the nodes are too far apart to measure a deviation, half a spacing is
     /// added to it, since the posterior may be between nodes.
-    pub fn narrowed(self, found: &Found<K>) -> Self {
+    pub(crate) fn narrowed(self, found: &Found<K>) -> Self {
         let slack = if found.is_tempered() { 0.25 } else { 1.0 / 48.0 };
         let spread = found.covariance + SMatrix::identity() * (slack * found.step * found.step);
         let (centre, covariance) = self.moments(&found.mean, &spread);
@@ -123,7 +123,7 @@ impl<const K: usize> Region<K> {
     }
 
     /// The same grid with half the distance between its nodes.
-    pub fn refined(self) -> Self {
+    pub(crate) fn refined(self) -> Self {
         Self {
             nodes: 2 * self.nodes - 1,
             ..self
@@ -131,7 +131,7 @@ impl<const K: usize> Region<K> {
     }
 
     /// The two sides of `along' t = offset`, a plane in grid coordinates.
-    pub fn split(self, along: &SVector<f64, K>, offset: f64) -> [Self; 2] {
+    pub(crate) fn split(self, along: &SVector<f64, K>, offset: f64) -> [Self; 2] {
         // t = diag(1/deviations) axes' (u - centre)
         let normal = self.axes * along.component_div(&self.deviations);
         let offset = normal.dot(&self.centre) + offset;

@@ -6,7 +6,7 @@ use fewbits_baselines::dymbo::centre::ScalarEstimator;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_core::factor::Value;
-use fewbits_core::{Gaussian, Link, NumberFormat, Observation, Observed, SensorNode, Sign};
+use fewbits_core::{Gaussian, Likelihood, Link, NumberFormat, Observation, Observed, SensorNode, Sign};
 use fewbits_densities::Mixture;
 use fewbits_diffusive::{RateModel, RateRange, Search, SearchBox, SearchField, SourceChain, SourceSensor, Status};
 use fewbits_dymbo::{CountFusion, DymboFilter, MultibitFilter, ParallelFilter, ScalarFilter};
@@ -169,10 +169,10 @@ fn censoring_sensors_and_all_send() {
                 };
                 let (observed, reports) = alone_network.transmit(&mut rng, &rules, predicted.mean(), z).unwrap();
                 sent += reports as u64 * u64::from(format.bits());
-                belief = alone_network
-                    .fuse(&predicted, &rules, predicted.mean(), &observed)
-                    .unwrap()
-                    .0;
+                let observed: Vec<_> = observed.into_iter().map(Some).collect();
+                belief = predicted;
+                let all = alone_network.likelihoods(&rules, predicted.mean(), &observed).unwrap();
+                all.condition(&mut belief).unwrap();
                 if threshold == 0.0 {
                     // All-send is the Kalman filter.
                     let all = plane_sensors()

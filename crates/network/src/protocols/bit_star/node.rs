@@ -135,7 +135,7 @@ impl<R: Receiver, const M: usize> BitNode<R, M> {
 /// Number of slots in which one node failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct Failures(u32);
+pub(crate) struct Failures(u32);
 
 impl Failures {
     /// Writes a note into the log, and counts it if it is a failure.
