@@ -51,6 +51,16 @@ impl<const M: usize> Censored<M> {
         }
     }
 
+    /// A value times `exp(log_scale)`. Values whose probability underflows are impossible, not an argument that is refused.
+    fn scaled(value: Value<M>, log_scale: f64) -> Result<Self, ArgumentError> {
+        if log_scale == f64::NEG_INFINITY {
+            return Self::constant(0.0);
+        }
+        Ok(Self {
+            kind: Kind::Value(value.times_exp(log_scale)?),
+        })
+    }
+
     /// An observation that has the same probability for every measurement, so it leaves the belief as it is.
     ///
     /// # Errors
@@ -64,9 +74,7 @@ impl<const M: usize> Censored<M> {
     /// # Errors
     /// If a number is not finite or `R` not positive definite.
     pub fn value(value: &SVector<f64, M>, noise: &SMatrix<f64, M, M>, arrival: f64) -> Result<Self, ArgumentError> {
-        Ok(Self {
-            kind: Kind::Value(Value::new(*value, *noise)?.times_exp(arrival.ln())?),
-        })
+        Self::scaled(Value::new(*value, *noise)?, arrival.ln())
     }
 
     /// `values` of identical sensors, each of which arrived with probability `arrival`. They act as one measurement, their mean:
@@ -81,10 +89,7 @@ impl<const M: usize> Censored<M> {
         let joint = Value::new(mean, noise / count)?;
         let single = Value::new(mean, *noise)?;
         let separate: f64 = values.iter().map(|z| single.log_likelihood(z)).sum();
-        let log_scale = separate - joint.log_likelihood(&mean) + count * arrival.ln();
-        Ok(Self {
-            kind: Kind::Value(joint.times_exp(log_scale)?),
-        })
+        Self::scaled(joint, separate - joint.log_likelihood(&mean) + count * arrival.ln())
     }
 
     /// Nothing arrived from `count` identical sensors. Each is silent by `rule` about `prediction`; its noise covariance is `R = noise`.

@@ -163,6 +163,15 @@ fn an_absurd_prior_is_impossible_or_finite() {
     }
 }
 
+/// Values of identical sensors that are so far apart that no number holds their probability.
+#[test]
+fn values_too_far_apart_are_impossible_and_not_refused() {
+    let prior = Gaussian::scalar(0.0, 1.0).unwrap();
+    let factor = Censored::values(&[Vector1::new(1e200), Vector1::new(-1e200)], &[[1.0]].into(), 0.5).unwrap();
+    assert_eq!(factor.tilted(&prior), Err(fewbits_core::Error::Impossible));
+    assert_eq!(factor.log_likelihood(&Vector1::new(0.3)), f64::NEG_INFINITY);
+}
+
 /// Issue: 50 honest sensors over a lossy link; with 60,000 steps it passes as well.
 #[test]
 fn fifty_honest_sensors_never_make_a_belief_that_is_no_number() {

@@ -6,8 +6,7 @@ use fewbits_core::laws::likelihood::sweep_is_scalar;
 use fewbits_core::{Belief, Density, Gaussian, Likelihood, laws};
 use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::{
-    Form, JointBelief, PositionBelief, Posterior, Prior, RateModel, RateRange, RateSums, SourceLikelihood,
-    SourceSensor, Travelling, project,
+    Form, Posterior, Prior, RateModel, RateRange, RateSums, SourceLikelihood, SourceSensor, Travelling, project,
 };
 use fewbits_models::diffusion::{Air, Ground, Wall};
 use fewbits_numerics::quadrature::Rule;

@@ -105,7 +105,7 @@ fn run(particles: usize, stream: Stream) -> [f64; 3] {
             for observation in &observations {
                 let factor = match observation.received() {
                     Some(z) => Scalar::from(factor::Value::scalar(z[0], 1.0).unwrap()),
-                    None => silence.into(),
+                    None => silence.clone().into(),
                 };
                 let observed = Observed::new(sensor, factor);
                 filter.update(&mut rng, &mut cloud, &[&observed]).unwrap();

@@ -309,7 +309,7 @@ fn vector_run<const M: usize>(filter: &Filter<M>, at_once: bool, start: Gaussian
             let factor = Levels::sign(bit, threshold, sensor.noise_variance(), &Link::PERFECT).unwrap();
             for cloud in &mut clouds {
                 exact
-                    .update(&mut rng, cloud, &[&Observed::new(*sensor, factor)])
+                    .update(&mut rng, cloud, &[&Observed::new(*sensor, factor.clone())])
                     .unwrap();
             }
             if !at_once {
