@@ -11,6 +11,7 @@ use nalgebra::{SMatrix, SVector};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::sync::{Mutex, PoisonError};
 
 /// Calls `$body` with `$D` a constant equal to `$dimension`.
 macro_rules! with_dimension {
@@ -93,9 +94,31 @@ impl<const D: usize> Moves<D> {
 
 type Affine<const D: usize> = (SMatrix<f64, D, D>, SVector<f64, D>, SMatrix<f64, D, D>);
 
-impl<const D: usize> Evolution<D> for Moves<D> {
+/// A model that keeps its dynamics over the last time: rows of a table are mostly as far apart as those before.
+pub(crate) struct Remembering<const D: usize> {
+    moves: Moves<D>,
+    last: Mutex<Option<(f64, AffineGaussian<D>)>>,
+}
+
+impl<const D: usize> Remembering<D> {
+    pub(crate) fn new(moves: Moves<D>) -> Self {
+        Self {
+            moves,
+            last: Mutex::new(None),
+        }
+    }
+}
+
+impl<const D: usize> Evolution<D> for Remembering<D> {
     fn over(&self, seconds: f64) -> Result<Box<dyn GaussianDynamics<D> + '_>, ArgumentError> {
-        Ok(Box::new(self.lasting(seconds)?))
+        // A lock whose owner has panicked holds a whole entry: it is written at once.
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        let moved = match *last {
+            Some((same, moved)) if same == seconds => moved,
+            _ => self.moves.lasting(seconds)?,
+        };
+        *last = Some((seconds, moved));
+        Ok(Box::new(moved))
     }
 }
 

@@ -1,15 +1,17 @@
 //! Random numbers of the library, and the parts of a particle filter over arrays: weights and resampling.
 
-use crate::array::{numbers, vector};
+use crate::array::{line, shown, vector};
 use crate::error::{Outcome, refused};
 use fewbits_filters::Resampling;
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::kernels::StandardNormals;
-use numpy::PyArray1;
+use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 
+/// Numbers that are drawn together.
+const BLOCK: usize = 512;
 /// Largest number of numbers of one call.
 const MOST: usize = 1 << 32;
 
@@ -47,6 +49,50 @@ impl Generator {
         let mut normals = vec![0.0; checked(count)?];
         self.normals.fill(&mut normals);
         Ok(PyArray1::from_vec(py, normals))
+    }
+
+    /// Adds independent normal numbers of mean 0 and this `deviation` to an array, in place: the noise of a coordinate without arrays in
+    /// between.
+    ///
+    /// Raises `fewbits.ArgumentError` if `array` is no writable one-dimensional array of doubles.
+    ///
+    /// >>> import numpy as np, fewbits as fb
+    /// >>> x = np.full((2, 1000), 5.0)
+    /// >>> fb.Generator(1).add_normal(x[1], 0.5)
+    /// >>> bool(x[0].std() == 0), bool(abs(x[1].std() - 0.5) < 0.05)
+    /// (True, True)
+    fn add_normal(&mut self, array: &Bound<'_, PyAny>, deviation: f64) -> Outcome<()> {
+        if !(deviation >= 0.0 && deviation.is_finite()) {
+            return refused("deviation", deviation, "a finite number, 0 or above");
+        }
+        let expected = "a writable one-dimensional array of doubles";
+        let Ok(cells) = array.cast::<PyArray1<f64>>() else {
+            return refused("array", shown(array), expected);
+        };
+        let Ok(mut cells) = cells.try_readwrite() else {
+            return refused("array", "one that cannot be written", expected);
+        };
+        let mut normals = [0.0; BLOCK];
+        let mut add = |cells: &mut [f64]| {
+            for cells in cells.chunks_mut(BLOCK) {
+                let normals = &mut normals[..cells.len()];
+                self.normals.fill(normals);
+                cells
+                    .iter_mut()
+                    .zip(normals)
+                    .for_each(|(x, normal)| *x += deviation * *normal);
+            }
+        };
+        match cells.as_slice_mut() {
+            Ok(cells) => add(cells),
+            Err(_) => {
+                let mut cells = cells.as_array_mut();
+                let mut own = cells.to_vec();
+                add(&mut own);
+                cells.iter_mut().zip(own).for_each(|(x, own)| *x = own);
+            }
+        }
+        Ok(())
     }
 
     /// `count` independent numbers, uniform in [0, 1).
@@ -97,7 +143,7 @@ pub(crate) fn resample<'py>(
     scheme: &str,
     seed: u64,
 ) -> Outcome<Bound<'py, PyArray1<i64>>> {
-    let weights = numbers::<f64>(weights)?;
+    let weights = line::<f64>("weights", weights)?;
     let weights = weights.as_slice().map_err(PyErr::from)?;
     let scheme = match scheme {
         "systematic" => Resampling::Systematic,

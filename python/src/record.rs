@@ -95,6 +95,13 @@ impl Taken {
             .into_iter()
             .filter(|name| Some(name.as_str()) != time)
             .collect();
+        if let Some(stamps) = names
+            .iter()
+            .find(|name| matches!(given.kind(name), Ok(DataType::Timestamp(..) | DataType::Date32 | DataType::Date64)))
+        {
+            let expected = "numbers: name the column of times in `time`, and leave out others";
+            return refused("column", format!("'{stamps}' of times"), expected);
+        }
         let columns = names.iter().map(|name| given.numbers(name)).collect::<Outcome<_>>()?;
         let (time, ticks) = match time {
             Some(name) => {
@@ -129,20 +136,22 @@ impl Taken {
     }
 }
 
-/// The time base and the ticks of a column: timestamps in their own unit, numbers as seconds with as many decimals as they have.
+/// The time base and the ticks of a column: timestamps in their own unit, dates as their midnights, numbers as seconds with as many decimals
+/// as they have.
 pub(crate) fn clock(given: &Given, name: &str) -> Outcome<(TimeBase, Vec<i64>)> {
     let base = |decimals, format| TimeBase::Clock {
         decimals,
         format,
         tolerance: 0,
     };
-    if let DataType::Timestamp(unit, _) = given.kind(name)? {
-        let decimals = match unit {
-            TimeUnit::Second => 0,
-            TimeUnit::Millisecond => 3,
-            TimeUnit::Microsecond => 6,
-            TimeUnit::Nanosecond => 9,
-        };
+    let decimals = match given.kind(name)? {
+        DataType::Timestamp(TimeUnit::Second, _) | DataType::Date32 => Some(0),
+        DataType::Timestamp(TimeUnit::Millisecond, _) | DataType::Date64 => Some(3),
+        DataType::Timestamp(TimeUnit::Microsecond, _) => Some(6),
+        DataType::Timestamp(TimeUnit::Nanosecond, _) => Some(9),
+        _ => None,
+    };
+    if let Some(decimals) = decimals {
         let mut all = Vec::new();
         for column in given.arrays(name)? {
             all.extend(ticks(name, column, decimals)?);

@@ -4,7 +4,6 @@ use crate::array::{matrix, shown, vector};
 use crate::callbacks::{Likelihoods, returned, rising};
 use crate::error::{Failure, Outcome, refused};
 use crate::model::{square, with_dimension};
-use crate::nodes::dt_of;
 use crate::seat::Sends;
 use crate::table::{Given, Table, doubles};
 use arrow_array::Int64Array;
@@ -239,7 +238,7 @@ impl SigmaPointFilter {
         for (row, second) in seconds.into_iter().enumerate() {
             py.check_signals()?;
             let observation = self.measures.row(py, &columns, row)?;
-            let (log, bits) = self.advanced(py, Some(&observation), dt_of(second, now))?;
+            let (log, bits) = self.advanced(py, Some(&observation), second - now)?;
             now = second;
             logs.push(log);
             sent.push(bits);

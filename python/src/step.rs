@@ -2,7 +2,7 @@
 
 use crate::error::{Outcome, refused};
 use crate::instants::Instant;
-use crate::model::Moves;
+use crate::model::{Moves, Remembering};
 use crate::parts::Parts;
 use crate::seat::{Seat, Sends};
 use crate::table::{Table, doubles};
@@ -57,7 +57,7 @@ impl<const D: usize> Built<D> {
             rate: parts.failures,
             ..Failures::default()
         };
-        let mut centre = FusionCentre::new(&mut rng, model, MomentFilter, &prior)?
+        let mut centre = FusionCentre::new(&mut rng, Remembering::new(model), MomentFilter, &prior)?
             .with_health(parts.tests.health())
             .with_failures(failures)?
             .with_window(parts.window)?;

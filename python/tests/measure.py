@@ -29,7 +29,7 @@ def codec():
 
 def move(x, dt, rng):
     x[0] += x[1]
-    x[1] += 0.05 * rng.standard_normal(x.shape[1])
+    rng.add_normal(x[1], 0.05)
 
 
 def root(x):

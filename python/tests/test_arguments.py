@@ -138,6 +138,7 @@ CALLS = {
     "Table": (fb.Table, ["columns"], []),
     "plot": (fb.plot, ["table"], ["x", "y", "band"]),
     "Generator": (fb.Generator, ["seed"], []),
+    "Generator.add_normal": (fb.Generator(1).add_normal, ["array", "deviation"], []),
     "design": (
         lambda **k: fb.design(**{"prior": (0.0, 1.0), "noise": [1.0], "bits": [1], "seconds": 0.01, **k}),
         [],

@@ -2,7 +2,8 @@
 
 import math
 import pickle
-from datetime import UTC, datetime, timedelta, timezone
+from datetime import UTC, date, datetime, timedelta, timezone
+from decimal import Decimal
 
 import numpy as np
 import pandas as pd
@@ -239,3 +240,24 @@ def test_a_picture_has_lines_and_bands():
     assert len(axes.lines) == len(axes.collections) == 2
     with pytest.raises(ValueError, match="one of"):
         joined().run(wide(), time="t").plot(y="none")
+
+
+def test_dates_decimals_and_durations_are_taken(tmp_path):
+    days = [date(2026, 1, 1) + timedelta(days=3 * i) for i in range(40)]
+    table = pa.table(
+        {
+            "day": pa.array(days),
+            "price": pa.array([None if i == 7 else Decimal(2013 + i) / 100 for i in range(40)], pa.decimal128(9, 2)),
+            "lasted": pa.array([timedelta(milliseconds=1500 * i) for i in range(40)], pa.duration("ms")),
+        }
+    )
+    fb.write(table, tmp_path / "days.fewb", time="day")
+    assert fb.verify(table, tmp_path / "days.fewb", time="day")["holds"]
+    read = fb.read(tmp_path / "days.fewb")
+    assert np.array_equal(read["price"], [np.nan if i == 7 else (2013 + i) / 100 for i in range(40)], equal_nan=True)
+    assert np.array_equal(read["lasted"], 1.5 * np.arange(40))
+    assert pl.DataFrame(read)["time"].dt.date().to_list() == days
+    centre = fb.FusionCentre(fb.Model.walk(1e-6), mean=20.0, deviation=1.0)
+    centre.join("price", noise=0.05)
+    result = centre.run(table, time="day")
+    assert len(result) == 40 and abs(result["x0"][-1] - 20.5) < 0.2

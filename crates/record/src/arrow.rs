@@ -15,9 +15,10 @@ use crate::recorder::Recorder;
 use crate::schema::{Schema, TimeBase, TimeFormat};
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    ArrowPrimitiveType, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, TimestampMicrosecondType,
-    TimestampMillisecondType, TimestampNanosecondType, TimestampSecondType, UInt8Type, UInt16Type, UInt32Type,
-    UInt64Type,
+    ArrowPrimitiveType, Date32Type, Date64Type, Decimal32Type, Decimal64Type, Decimal128Type, DurationMicrosecondType,
+    DurationMillisecondType, DurationNanosecondType, DurationSecondType, Float32Type, Float64Type, Int8Type, Int16Type,
+    Int32Type, Int64Type, TimestampMicrosecondType, TimestampMillisecondType, TimestampNanosecondType,
+    TimestampSecondType, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
 };
 use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, PrimitiveArray, RecordBatch};
 use arrow_schema::{DataType, Field, TimeUnit};
@@ -143,10 +144,23 @@ where
     Arc::new(PrimitiveArray::<T>::from_iter_values(ticks).with_timezone_opt(zone))
 }
 
-/// The cells of an array of numbers, `None` for nulls.
+/// The double nearest to `unscaled 10^-scale`; nothing for more than 53 bits.
+fn decimal(unscaled: i128, scale: i8) -> Option<f64> {
+    let power = 10_f64.powi(i32::from(scale).abs());
+    let exact = unscaled.unsigned_abs() <= MAX_WHOLE as u128;
+    exact.then(|| {
+        if scale < 0 {
+            unscaled as f64 * power
+        } else {
+            unscaled as f64 / power
+        }
+    })
+}
+
+/// The cells of an array of numbers, `None` for nulls. Decimals become the nearest doubles, durations seconds.
 ///
 /// # Errors
-/// If the array has no numbers, or an integer above 2^53, which is not an exact double.
+/// If the array has no numbers, or one of more than 53 bits, which is not an exact double.
 pub fn cells(name: &str, array: &dyn Array) -> Result<Cells, Error> {
     fn of<T: ArrowPrimitiveType>(array: &dyn Array, number: impl Fn(T::Native) -> Option<f64>) -> Option<Cells> {
         let cells = array.as_primitive::<T>().iter();
@@ -177,6 +191,18 @@ pub fn cells(name: &str, array: &dyn Array) -> Result<Cells, Error> {
                 .collect(),
         ),
         DataType::Null => Some(vec![None; array.len()]),
+        DataType::Decimal32(_, scale) => of::<Decimal32Type>(array, |x| decimal(x.into(), *scale)),
+        DataType::Decimal64(_, scale) => of::<Decimal64Type>(array, |x| decimal(x.into(), *scale)),
+        DataType::Decimal128(_, scale) => of::<Decimal128Type>(array, |x| decimal(x, *scale)),
+        DataType::Duration(unit) => {
+            let seconds = |ticks: i64| decimal(ticks.into(), decimals_of(*unit) as i8);
+            match unit {
+                TimeUnit::Second => of::<DurationSecondType>(array, seconds),
+                TimeUnit::Millisecond => of::<DurationMillisecondType>(array, seconds),
+                TimeUnit::Microsecond => of::<DurationMicrosecondType>(array, seconds),
+                TimeUnit::Nanosecond => of::<DurationNanosecondType>(array, seconds),
+            }
+        }
         other => return Err(refuse(format!("`{name}` of {other}"), "numbers: leave the column out, or cast it")),
     };
     found.ok_or_else(|| refuse(format!("`{name}`"), "whole numbers of at most 53 bits: split the column"))
@@ -200,7 +226,8 @@ fn codes(name: &str, array: &dyn Array, integers: Integers) -> Result<Cells, Err
     codes.ok_or_else(|| ArgumentError::new("column", format!("`{name}`"), "whole numbers of 64 bits").into())
 }
 
-/// The times of an array as ticks of `10^-decimals` seconds. Timestamps may have any unit; integers are taken as ticks.
+/// The times of an array as ticks of `10^-decimals` seconds. Timestamps may have any unit; dates are their midnights; integers are taken as
+/// ticks.
 ///
 /// # Errors
 /// If the array has no times, one is missing, or a tick overflows.
@@ -209,7 +236,16 @@ pub fn ticks(name: &str, array: &dyn Array, decimals: u8) -> Result<Vec<i64>, Er
     if array.null_count() > 0 {
         return Err(refuse(format!("`{name}` with gaps"), "a time in every row"));
     }
+    if *array.data_type() == DataType::Date32 {
+        let day = 86_400 * 10_i64.pow(decimals.into());
+        let days = array.as_primitive::<Date32Type>().values().iter();
+        let ticks: Option<Vec<i64>> = days.map(|days| i64::from(*days).checked_mul(day)).collect();
+        return ticks.ok_or_else(|| {
+            refuse(format!("`{name}`"), &format!("dates that fit 64 bits with {decimals} decimals of a second"))
+        });
+    }
     let (numbers, unit) = match array.data_type() {
+        DataType::Date64 => (array.as_primitive::<Date64Type>().values(), Some(TimeUnit::Millisecond)),
         DataType::Int64 => (array.as_primitive::<Int64Type>().values(), None),
         DataType::Timestamp(unit, _) => {
             let values = match unit {
@@ -220,7 +256,7 @@ pub fn ticks(name: &str, array: &dyn Array, decimals: u8) -> Result<Vec<i64>, Er
             };
             (values, Some(*unit))
         }
-        other => return Err(refuse(format!("`{name}` of {other}"), "timestamps, or 64-bit integers")),
+        other => return Err(refuse(format!("`{name}` of {other}"), "timestamps, dates or 64-bit integers")),
     };
     let shift = unit.map_or(0, |unit| i32::from(decimals) - i32::from(decimals_of(unit)));
     let scale = 10_i64.checked_pow(shift.unsigned_abs());

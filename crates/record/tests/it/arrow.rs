@@ -119,3 +119,24 @@ fn whole_numbers_of_64_bits_are_integers() {
             .is_err()
     );
 }
+
+/// Decimals and durations are numbers, dates are midnights; what is no exact double is refused.
+#[test]
+fn decimals_durations_and_dates_are_taken() {
+    use arrow_array::{Date32Array, Decimal128Array, DurationMillisecondArray};
+    use fewbits_record::arrow::{cells, ticks};
+    let prices = Decimal128Array::from(vec![Some(2013), None, Some(-5)])
+        .with_precision_and_scale(9, 2)
+        .unwrap();
+    assert_eq!(cells("x", &prices).unwrap(), [Some(20.13), None, Some(-0.05)]);
+    let thousands = Decimal128Array::from(vec![7]).with_precision_and_scale(9, -3).unwrap();
+    assert_eq!(cells("x", &thousands).unwrap(), [Some(7000.0)]);
+    let long = Decimal128Array::from(vec![1_i128 << 60])
+        .with_precision_and_scale(30, 2)
+        .unwrap();
+    assert!(cells("x", &long).is_err());
+    assert_eq!(cells("x", &DurationMillisecondArray::from(vec![Some(1500), None])).unwrap(), [Some(1.5), None]);
+    let days = Date32Array::from(vec![-1, 0, 20_454]);
+    assert_eq!(ticks("t", &days, 3).unwrap(), [-86_400_000, 0, 1_767_225_600_000]);
+    assert!(ticks("t", &Date32Array::from(vec![i32::MAX]), 9).is_err());
+}
