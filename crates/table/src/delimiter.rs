@@ -90,7 +90,7 @@ pub(crate) fn delimiter(lines: &[&str], quote: u8) -> Delimiter {
             count >= 3
                 && names <= MAX_TITLES
                 && (names + 1..=names + 2).contains(&data)
-                && !lines[names..data].iter().any(|line| is_number(line))
+                && !lines[names..data].iter().any(&is_number)
                 && lines[data..].iter().all(|line| words(line) == count && is_number(line))
         })
     };

@@ -5,9 +5,7 @@ use fewbits_core::Error;
 use fewbits_core::{Gaussian, Likelihood, Observed};
 use fewbits_filters::{Info, StateFilter};
 use fewbits_monte_carlo::{Moments, Stream};
-use fewbits_pf_mpa::{
-    GridFilter, QuantizedRange, RangeNoise, RangeReference, RangeSensor, optimal_loading,
-};
+use fewbits_pf_mpa::{GridFilter, QuantizedRange, RangeNoise, RangeReference, RangeSensor, optimal_loading};
 use nalgebra::{Matrix2, Vector2};
 
 /// Trials per setting; the specification's check took 1000.
