@@ -55,7 +55,6 @@
 //! ```
 //!
 //! Not here: the radio (`fewbits-network`), and the design of a quantizer for the values (`fewbits-quantizer-design`).
-#![warn(unreachable_pub)]
 
 pub mod censored;
 pub mod ellipsoid;

@@ -39,7 +39,6 @@
 //! ```
 //!
 //! This crate contains no particular model, filter or experiment.
-#![warn(unreachable_pub)]
 
 pub mod assumed_density;
 pub mod belief;

@@ -42,7 +42,6 @@
 //! ```
 //!
 //! Not here: energy and radio (`fewbits-network`), and the choice of which sensor reports (`fewbits-sensor-assignment`).
-#![warn(unreachable_pub)]
 
 pub mod chain;
 mod filter;

@@ -35,7 +35,6 @@
 //! ```
 //!
 //! Not in this crate: the scheme of any single paper, and time-varying models (pass another model at each step).
-#![warn(unreachable_pub)]
 
 mod backward_simulation;
 pub mod calibration;

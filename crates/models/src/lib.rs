@@ -37,7 +37,6 @@
 //! ```
 //!
 //! Not in this crate: time-varying matrices, estimation.
-#![warn(unreachable_pub)]
 
 mod ar1;
 mod auto;

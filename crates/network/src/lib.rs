@@ -56,7 +56,6 @@
 //! ```
 //!
 //! Not here: estimators and filters (`fewbits-filters` and the crates of the schemes).
-#![warn(unreachable_pub)]
 
 mod clock;
 mod error;

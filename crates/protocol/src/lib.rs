@@ -34,7 +34,6 @@
 //! ```
 //!
 //! Not here: estimators, radio and energy (`fewbits-network`), sockets and keys (`fewbits-link`).
-#![warn(unreachable_pub)]
 #![cfg_attr(not(feature = "std"), no_std)]
 
 #[cfg(feature = "std")]
