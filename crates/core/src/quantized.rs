@@ -31,6 +31,14 @@ pub trait Quantized: Send + Sync {
     /// The noise of the measurement.
     fn measurement_noise(&self) -> Noise;
 
+    /// Whether the feedback is valid; by default it always is.
+    ///
+    /// # Errors
+    /// If it is not.
+    fn check(&self, _feedback: &Self::Feedback) -> Result<(), Error> {
+        Ok(())
+    }
+
     /// The report of a measurement.
     ///
     /// # Errors
@@ -103,6 +111,7 @@ impl<Q: Quantized> Scheme<1> for Q {
         observation: &Observation<Q::Report>,
         link: &Link,
     ) -> Result<Scalar, Error> {
+        self.check(feedback)?;
         let Observation::Received(report) = observation else {
             return Ok(Constant::of_delivery(observation, link).into());
         };

@@ -197,7 +197,8 @@ impl Message for Packet {
     type Format = Contract;
 
     /// One bit for the kind. Raw: the number of records (10 bits), and of each its index and samples. Belief: components and the code
-    /// of another form (5 bits each, 31 for a mixture), one bit for the rate, the numbers, and the fit so far (32 bits for the sum, 16 for the samples).
+    /// of another form (5 bits each, 31 for a mixture), one bit for the rate, the numbers, and the fit so far (32 bits for the sum, 16 for
+    /// the samples).
     fn encode(&self, format: &Contract, writer: &mut BitWriter) -> Result<(), CodecError> {
         match self {
             Self::Raw(records) => {

@@ -19,6 +19,13 @@ pub struct Prediction {
     pub deviation: f64,
 }
 
+impl Prediction {
+    fn check(&self) -> Result<(), ArgumentError> {
+        finite("prediction", self.mean)?;
+        positive("deviation", self.deviation).map(|_| ())
+    }
+}
+
 /// The prediction of the measurement from a belief of the measurement: mean and standard deviation. The noise must be included.
 impl From<&Gaussian<1>> for Prediction {
     fn from(measurement: &Gaussian<1>) -> Self {
@@ -151,8 +158,7 @@ impl InnovationWord {
     }
 
     fn centred(&self, prediction: &Prediction) -> Result<Vec<f64>, ArgumentError> {
-        finite("prediction", prediction.mean)?;
-        positive("deviation", prediction.deviation)?;
+        prediction.check()?;
         let edges = self.quantizer.breakpoints().iter();
         Ok(edges.map(|z| prediction.mean + prediction.deviation * z).collect())
     }
@@ -172,6 +178,10 @@ impl Quantized for InnovationWord {
 
     fn measurement_noise(&self) -> Noise {
         self.noise_variance.into()
+    }
+
+    fn check(&self, prediction: &Prediction) -> Result<(), Error> {
+        Ok(prediction.check()?)
     }
 
     #[inline]

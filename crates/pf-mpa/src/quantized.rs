@@ -188,6 +188,10 @@ impl Quantized for QuantizedRange {
         self.noise.into()
     }
 
+    fn check(&self, reference: &RangeReference) -> Result<(), Error> {
+        Ok(reference.check()?)
+    }
+
     fn report_of(&self, range: f64, reference: &RangeReference) -> Result<Symbol, Error> {
         Ok(self.level(range, reference)?)
     }
