@@ -1,4 +1,4 @@
-//! A hundred random models: the design on request against multi-start Nelder-Mead of the same time, with time limits.
+//! A hundred random models: the design on request against multi-start Nelder-Mead of the same processor time, with limits of it.
 //!
 //! `cargo run --release -p fewbits-quantizer-design --example random_models -- models.log 100 500 3000`: log file, number of
 //! models, limits in milliseconds. A model with a line in the log is not run again. At the end the whole log is summed up.
@@ -8,8 +8,10 @@ mod models;
 #[path = "../tests/it/nelder_mead.rs"]
 mod nelder_mead;
 
+use fewbits_quantizer_design::Solutions;
+use fewbits_quantizer_design::solve::system_clock;
 use std::io::Write;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A ratio above this is worse than Nelder-Mead.
 const WORSE: f64 = 1.0 + 1e-9;
@@ -51,48 +53,30 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// Ratio of the squared errors, seconds, relative change in another unit (a dash where a limit was met), and what it was.
 fn compare(i: u64, limit: Duration) -> Result<String, Box<dyn std::error::Error>> {
     let scale = |at: u64| [1.0, 1e-4, 1e4][at as usize % 3];
+    let solve = |task: &models::Task, limit| -> Result<Solutions, Box<dyn std::error::Error>> {
+        Ok(task.request()?.with_clock(on_processor).with_time_limit(limit).run()?)
+    };
     let task = models::task(i, scale(i), 5, 4)?;
-    let watch = Stopwatch::start();
-    let found = task.solve(Some(limit))?;
-    let time = watch.elapsed();
+    let start = on_processor();
+    let found = solve(&task, limit)?;
+    let time = on_processor() - start;
     let error = task.exact(found.best())?;
-    let watch = Stopwatch::start();
-    let reference = task.nelder_mead(&|_| watch.elapsed() >= time)?;
+    let start = on_processor();
+    let reference = task.nelder_mead(&|_| on_processor() - start >= time)?;
     let unit = if found.is_cut_short {
         "-".into()
     } else {
         let (other, ratio) = (models::task(i, scale(i + 1), 5, 4)?, scale(i) / scale(i + 1));
-        let again = other.exact(other.solve(Some(10 * limit))?.best())?;
+        let again = other.exact(solve(&other, 10 * limit)?.best())?;
         format!("{:.1e}", again * ratio * ratio / error - 1.0)
     };
     let certificate = found.best().certificate;
     Ok(format!("{:.9} {:.3} {unit} {certificate:?} {}", error / reference, time.as_secs_f64(), task.what))
 }
 
-/// A span of time that the thread spends on the processor, or on the clock where the system does not tell.
-struct Stopwatch {
-    clock: Instant,
-    processor: Option<Duration>,
-}
-
-impl Stopwatch {
-    fn start() -> Self {
-        Self {
-            clock: Instant::now(),
-            processor: on_processor(),
-        }
-    }
-
-    fn elapsed(&self) -> Duration {
-        match (self.processor, on_processor()) {
-            (Some(start), Some(end)) => end.saturating_sub(start),
-            _ => self.clock.elapsed(),
-        }
-    }
-}
-
-/// Time of this thread on the processor so far.
-fn on_processor() -> Option<Duration> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    text.split(' ').next()?.parse().ok().map(Duration::from_nanos)
+/// Time that this thread has spent on the processor, so that a busy machine changes nothing; the usual clock where the system does not tell.
+fn on_processor() -> Duration {
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let spent = told.and_then(|text| text.split(' ').next()?.parse().ok());
+    spent.map_or_else(system_clock, Duration::from_nanos)
 }

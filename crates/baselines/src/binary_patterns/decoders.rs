@@ -173,15 +173,17 @@ fn continuous_map(bank: &Bank) -> Vec<f64> {
             estimates.push(0.5 * (points[first] + points[last]));
             return;
         }
-        // Between the points on either side the log posterior is unimodal, so the golden-section search finds its peak.
+        // Between the points on either side the log posterior is unimodal, so the golden-section search finds its peak. The numbers of ones
+        // are the digits of the outcome's index.
+        let (mut groups, mut rest) = (Vec::new(), index);
+        for (sensor, count) in bank.groups().collect::<Vec<_>>().into_iter().rev() {
+            groups.push((sensor, count, rest % (count + 1)));
+            rest /= count + 1;
+        }
         let posterior = |x: f64| {
-            let mut rest = index;
-            let groups: Vec<_> = bank.groups().collect();
-            groups.iter().rev().fold(prior(x), |sum, (sensor, count)| {
+            groups.iter().rev().fold(prior(x), |sum, (sensor, count, ones)| {
                 let [l0, l1] = sensor.log_probabilities(x);
-                let ones = rest % (count + 1);
-                rest /= count + 1;
-                sum + ones as f64 * l1 + (count - ones) as f64 * l0
+                sum + *ones as f64 * l1 + (count - ones) as f64 * l0
             })
         };
         let (low, high) = (points[first.saturating_sub(1)], points[(last + 1).min(points.len() - 1)]);

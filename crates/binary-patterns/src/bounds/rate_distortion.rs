@@ -38,7 +38,7 @@ impl ConditionalMean {
     }
 
     /// Density of the measurement.
-    pub fn measurement_density(&self, y: f64) -> f64 {
+    pub(super) fn measurement_density(&self, y: f64) -> f64 {
         match self.source.kind() {
             Kind::Uniform { half_width: v } if v < FAINT * self.noise_deviation => {
                 pdf(y / self.noise_deviation) / self.noise_deviation

@@ -159,7 +159,7 @@ impl Noise {
     }
 
     /// `1' Sigma^-1 1`: the inverse of the smallest variance of a weighted mean of the samples.
-    pub fn precision_of_mean(&self) -> f64 {
+    pub(crate) fn precision_of_mean(&self) -> f64 {
         // Sherman and Morrison's formula for a diagonal matrix plus one factor.
         let pairs = || self.loadings.iter().zip(&self.residuals);
         let own: f64 = self.residuals.iter().map(|d| 1.0 / (d * d)).sum();

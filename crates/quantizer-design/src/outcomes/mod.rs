@@ -19,7 +19,7 @@
 //! let signs = cell_probabilities(&[-1.0, 1.0], 1.0, &[0.0]);
 //! let counts = signs.of_counts(3);
 //! let joint = moments(&[&counts], &[Feature::of_all(vec![0.5, 0.5])]);
-//! assert!(joint.len() == 4 && (joint.iter().sum::<f64>() - 1.0).abs() < 1e-15);
+//! assert!(joint.len() == 4 && (joint.iter().sum::<f64>() - 1.0).abs() < 1e-14);
 //! ```
 
 pub(crate) mod axis;

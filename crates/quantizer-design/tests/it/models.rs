@@ -3,13 +3,12 @@
 use super::nelder_mead::minimise;
 use fewbits_core::Link;
 use fewbits_monte_carlo::Stream;
-use fewbits_quantizer_design::solve::{BitBudget, Request, Solution, Solutions};
+use fewbits_quantizer_design::solve::{BitBudget, Request, Solution};
 use fewbits_quantizer_design::{
     Channel, Criterion, Error, Labelling, Noise, ObservationModel, Prior, Quantizer, System, lloyd_max,
 };
 use rand::RngExt;
 use std::cell::Cell;
-use std::time::Duration;
 
 /// A model with its task.
 pub struct Task {
@@ -68,16 +67,10 @@ impl Task {
         System::new(self.model.clone(), solution.system().groups().to_vec())?.value(Criterion::MeanSquaredError)
     }
 
-    pub fn solve(&self, limit: Option<Duration>) -> Result<Solutions, Box<dyn std::error::Error>> {
-        let mut request = Request::estimation(
-            self.model.clone(),
-            BitBudget::PerSensor(self.bits.clone()),
-            Link::flipping(self.crossover)?,
-        );
-        if let Some(limit) = limit {
-            request = request.with_time_limit(limit);
-        }
-        Ok(request.run()?)
+    /// The design problem of the task.
+    pub fn request(&self) -> Result<Request<'static>, Box<dyn std::error::Error>> {
+        let (bits, link) = (BitBudget::PerSensor(self.bits.clone()), Link::flipping(self.crossover)?);
+        Ok(Request::estimation(self.model.clone(), bits, link))
     }
 
     /// Least squared error that Nelder-Mead finds until `is_over` holds of the number of its evaluations, from Lloyd-Max cells and random
