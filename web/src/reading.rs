@@ -93,6 +93,7 @@ fn unfit(table: &Table) -> Vec<(String, String)> {
         let column = &table.columns()[*i];
         let why = match column.kind {
             Kind::Text => "text",
+            Kind::Integer => "whole numbers of more than 53 bits",
             Kind::Words if recipe::unit(table, *i).is_empty() => "too many different words",
             _ => return None,
         };

@@ -36,24 +36,40 @@ pub(crate) fn read(bytes: Bytes) -> Result<Rows, String> {
             all.extend(cells);
         }
     }
-    let columns = schema.columns().iter().zip(&batch.columns).map(|(column, cells)| {
-        let numbers = || cells.iter().flatten().copied();
-        let finite = || numbers().filter(|number| number.is_finite());
-        let words = words_of(column.unit());
-        Known {
-            name: column.name().to_owned(),
-            unit: column.unit().to_owned(),
-            kind: if words.is_some() { "words" } else { "number" },
-            words,
-            samples: numbers().count(),
-            gaps: cells.len() - numbers().count(),
-            min: finite().reduce(f64::min),
-            max: finite().reduce(f64::max),
-            sentinel: None,
-            sentinel_cells: 0,
-            period: column.period(),
-        }
-    });
+    // Their samples are codes, and the page computes with doubles.
+    let is_kept: Vec<bool> = schema
+        .columns()
+        .iter()
+        .map(|column| column.integers().is_none())
+        .collect();
+    let left_out = schema.columns().iter().filter(|column| column.integers().is_some());
+    skipped.extend(left_out.map(|column| {
+        format!("column `{}`: whole numbers of 64 bits are not shown: use `fewbits unpack`", column.name())
+    }));
+    let mut keeps = is_kept.iter().copied();
+    batch.columns.retain(|_| keeps.next().unwrap_or(true));
+    let kept = schema.columns().iter().zip(&is_kept).filter(|(_, is_kept)| **is_kept);
+    let columns = kept
+        .map(|(column, _)| column)
+        .zip(&batch.columns)
+        .map(|(column, cells)| {
+            let numbers = || cells.iter().flatten().copied();
+            let finite = || numbers().filter(|number| number.is_finite());
+            let words = words_of(column.unit());
+            Known {
+                name: column.name().to_owned(),
+                unit: column.unit().to_owned(),
+                kind: if words.is_some() { "words" } else { "number" },
+                words,
+                samples: numbers().count(),
+                gaps: cells.len() - numbers().count(),
+                min: finite().reduce(f64::min),
+                max: finite().reduce(f64::max),
+                sentinel: None,
+                sentinel_cells: 0,
+                period: column.period(),
+            }
+        });
     let time = batch
         .ticks
         .as_ref()

@@ -6,7 +6,7 @@ use crate::days::{by_name, may_be_days, may_be_julian};
 use crate::dialect::Dialect;
 use crate::error::Error;
 use crate::guess;
-use crate::parts::{calendar, of_day_parts, parts};
+use crate::parts::{calendar, monthly, of_day_parts, parts};
 use crate::time::{Scale, Unit};
 use crate::written::{self, Clock, Order, Problem, Syntax};
 
@@ -69,6 +69,10 @@ fn is_time_name(name: &str) -> bool {
             "datetime",
             "date-time",
             "time(",
+            "time[",
+            "zeit ",
+            "zeit(",
+            "zeit[",
         ]
         .iter()
         .any(|begin| lower.starts_with(begin))
@@ -168,6 +172,13 @@ pub(crate) fn guess(
     let dated = if dates.is_empty() { days } else { dates };
     if let (true, Some(calendar)) = (dated.is_empty(), calendar(columns)) {
         return Some(calendar);
+    }
+    if let (true, Some([year, month])) = (dated.is_empty(), monthly(columns)) {
+        let is_month = |cell: &String| cell.parse::<u8>().is_ok_and(|month| (1..=12).contains(&month));
+        let is_year = |cell: &String| cell.parse::<u16>().is_ok_and(|year| (1600..=2300).contains(&year));
+        if !samples[month].is_empty() && samples[month].iter().all(is_month) && samples[year].iter().all(is_year) {
+            return Some(vec![year, month]);
+        }
     }
     let dated = if dated.is_empty() { clocks } else { dated };
     match dated.as_slice() {

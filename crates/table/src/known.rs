@@ -59,7 +59,7 @@ pub(crate) fn recognise(lines: &[(u64, String)], dialect: &mut Dialect) {
         && first.contains(",Start,Increment")
     {
         // Rigol oscilloscopes: names, a line of units with the first time and the step, and rows without these two.
-        set("Rigol", Some(0), false, 1, ",");
+        set("Rigol", Some(0), true, 0, ",");
         dialect.short_rows = true;
     } else if first.starts_with("LOCATION,") {
         // EnergyPlus weather: eight lines or fewer, then rows without names.

@@ -54,6 +54,13 @@ pub(crate) fn calendar(columns: &[Column]) -> Option<Vec<usize>> {
     is_date.then(|| (first..first + found.len()).collect())
 }
 
+/// Columns side by side that are named as a year and a month.
+pub(crate) fn monthly(columns: &[Column]) -> Option<[usize; 2]> {
+    let of = |i: usize, before: &[Part]| part(&columns.get(i)?.own_name, before);
+    let year = (0..columns.len()).find(|i| of(*i, &[]) == Some(Part::Year))?;
+    (of(year + 1, &[Part::Year]) == Some(Part::Month)).then_some([year, year + 1])
+}
+
 /// Meanings of columns that give a date together, by their names, or by their cells.
 pub(crate) fn parts(names: &[&str], sample: &[String]) -> Option<Vec<Part>> {
     let mut found = Vec::new();

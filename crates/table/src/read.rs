@@ -386,10 +386,13 @@ fn number(text: &str, meaning: &Meaning<'_>) -> Result<Option<f64>, number::Prob
     }
 }
 
+/// Whole doubles below this are numbers of 64 bits.
+const MOST: f64 = 9_223_372_036_854_775_808.0;
+
 fn integer(text: &str, syntax: number::Syntax) -> Result<Option<i64>, number::Problem> {
     match number::parse(text.as_bytes(), syntax)? {
         Number::Whole(whole) => Ok(Some(whole)),
-        Number::Double(value, _) if value.fract() == 0.0 && value.abs() < 9.2e18 => Ok(Some(value as i64)),
+        Number::Double(value, _) if value.fract() == 0.0 && (-MOST..MOST).contains(&value) => Ok(Some(value as i64)),
         Number::Double(..) => Err((
             "is no whole number, as others of the column",
             "mend the cell, or leave the column out with --without",

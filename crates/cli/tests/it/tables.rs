@@ -298,7 +298,7 @@ fn whole_numbers_of_64_bits_come_back() {
     let all = column(&text(&good(path, &["unpack", "t.fewb"], b"")));
     assert_eq!(all, [ids.as_slice(), ids.as_slice(), &["5"]].concat());
     let message = refused(path, &["pack", "broken.csv", "--time", "exact", "--append", "-o", "t.fewb"], b"");
-    assert!(message.contains("`5.5` is no whole number of 64 bits"), "{message}");
+    assert!(message.contains("`5.5` is no whole number"), "{message}");
     good(path, &["pack", "doubles.csv", "--time", "exact", "-o", "d.fewb"], b"");
     let message = refused(path, &["pack", "t.csv", "--time", "exact", "--append", "-o", "d.fewb"], b"");
     assert!(message.contains("a recording of its own"), "{message}");
