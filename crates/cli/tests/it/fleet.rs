@@ -119,8 +119,13 @@ pub(crate) fn measuring(folder: &Path) -> [Running; 2] {
 
 /// A sensor at work.
 pub(crate) fn sensor(folder: &Path, file: &str) -> Running {
+    reading(folder, file, "5.0\n5.2\n")
+}
+
+/// A sensor that reads these samples again and again.
+fn reading(folder: &Path, file: &str, samples: &str) -> Running {
     let mut child = Running::new(start(folder, &["sensor", file]));
-    let samples = "value\n".to_owned() + &"5.0\n5.2\n".repeat(1600);
+    let samples = "value\n".to_owned() + &samples.repeat(1600);
     child.stdin.take().unwrap().write_all(samples.as_bytes()).unwrap();
     child
 }
@@ -321,6 +326,38 @@ fn all_faults_are_named_at_once_and_no_key_is_shown() {
         let said = text(&output.stderr);
         assert!(output.status.code() == Some(2) && said.contains("chmod 600"), "{said}");
     }
+}
+
+/// One of three sensors contradicts the others: the rows say so.
+#[test]
+fn a_sensor_that_contradicts_the_others_is_named() {
+    let (folder, place) = (tempfile::tempdir().unwrap(), free_place());
+    let mut centre = format!(
+        "listen = \"{place}\"\nperiod = 0.04\nmodel = {{ kind = \"random-walk\", density = 0.01 }}\n\
+         prior = {{ mean = [0.0], deviation = [10.0] }}\n"
+    );
+    for (number, digit) in [(1, 'a'), (2, 'b'), (3, 'c')] {
+        let same = format!("number = {number}\nkey = \"{}\"\ndeviation = 0.5\nreport = \"value\"\n", key(digit));
+        centre += &format!("[[sensor]]\n{same}loss = 0.1\n");
+        private(&folder.path().join(format!("sensor{number}.toml")), &format!("centre = \"{place}\"\n{same}"));
+    }
+    private(&folder.path().join("centre.toml"), &centre);
+    let mut centre = Running::new(start(folder.path(), &["centre", "centre.toml", "--slots", "1500"]));
+    let file = |number: u32| format!("sensor{number}.toml");
+    let sensors = [(1, "5.0\n5.2\n"), (2, "5.1\n4.9\n"), (3, "50.0\n50.2\n")]
+        .map(|(number, samples)| reading(folder.path(), &file(number), samples));
+    let mut lines = BufReader::new(centre.stdout.take().unwrap())
+        .lines()
+        .map_while(Result::ok);
+    // However many slots that takes on a busy machine.
+    let named = lines.find(|line| line.contains("excluded"));
+    centre.kill().unwrap();
+    centre.wait().unwrap();
+    for mut sensor in sensors {
+        let _ = sensor.kill();
+        sensor.wait().unwrap();
+    }
+    assert!(named.as_ref().is_some_and(|line| line.contains("excluded 3")), "{named:?}");
 }
 
 /// The words of `track`, keys that follow from the fleet's, and a sensor that is revoked.

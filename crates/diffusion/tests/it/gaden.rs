@@ -134,3 +134,21 @@ proptest! {
         let _ = Room::parse(&format!("{}{with}{}", &own[..at], &own[at..]));
     }
 }
+
+/// A room and a wind as the simulator itself wrote them.
+#[test]
+#[ignore = "set FEWBITS_GADEN_ROOM and FEWBITS_GADEN_WIND to files of the simulator"]
+fn files_of_the_simulator_are_read() {
+    let read = |name: &str| std::fs::read_to_string(std::env::var(name).unwrap()).unwrap();
+    let text = read("FEWBITS_GADEN_ROOM");
+    let room = Room::parse(&text).unwrap();
+    let domain = room.domain().unwrap();
+    let cells = text.lines().skip(4).flat_map(str::split_whitespace);
+    let air = cells.filter(|word| matches!(*word, "0" | "2")).count();
+    assert_eq!(domain.free().len(), air);
+    let wind = Table::parse(&read("FEWBITS_GADEN_WIND")).unwrap();
+    let velocities = room.wind(&domain, &wind).unwrap().velocities(&domain);
+    let fastest = velocities.iter().flatten().fold(0.0, |most: f64, v| most.max(v.abs()));
+    println!("{:?} cells, {air} of air, {} rows of wind, up to {fastest} m/s", room.counts(), wind.len());
+    assert!(velocities.len() == air && fastest.is_finite());
+}

@@ -276,13 +276,16 @@ where
         for (slot, count) in counted {
             let factor = self.observed(slot, working)?.factor.as_scalar();
             // Values are exact one after the other.
-            let Some((scalar, log)) = factor.filter(|(scalar, _)| M == 1 && !matches!(scalar, Scalar::Value(_))) else {
+            let Some(scalar) = factor.filter(|scalar| M == 1 && !matches!(scalar, Scalar::Value(_))) else {
                 return Ok(None);
             };
-            log_scale += *count as f64 * log;
-            match scalar {
-                Scalar::Constant(one) => log_scale += *count as f64 * one.probability().ln(),
-                other => product.push_repeated(Repeated::new(other, *count)?),
+            let constant = match &scalar {
+                Scalar::Levels(levels) => levels.as_constant(),
+                Scalar::Value(_) => None,
+            };
+            match constant {
+                Some(log) => log_scale += *count as f64 * log,
+                None => product.push_repeated(Repeated::new(scalar, *count)?),
             }
         }
         if product.factors().is_empty() {

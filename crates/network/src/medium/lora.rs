@@ -26,6 +26,9 @@ pub struct Lora {
     bandwidth: f64,
     coding: u32,
     preamble: u32,
+    /// Largest share of the time that a node may send.
+    #[serde(default)]
+    duty_cycle: Option<f64>,
 }
 
 impl Lora {
@@ -45,7 +48,23 @@ impl Lora {
             bandwidth,
             coding: 1,
             preamble: 8,
+            duty_cycle: None,
         })
+    }
+
+    /// The same, where each node sends no more than this share of the time: after a frame that took `t` on air its next one begins `t / share`
+    /// after the last began, or later. 0.01 in most bands of EU868.
+    ///
+    /// # Errors
+    /// If `share` is not above 0 and at most 1.
+    pub fn with_duty_cycle(self, share: f64) -> Result<Self, ArgumentError> {
+        let duty_cycle = Some(checked_share(share)?);
+        Ok(Self { duty_cycle, ..self })
+    }
+
+    /// Time from the beginning of a frame of this duration to that of the next, if there is a duty cycle.
+    pub(crate) fn period(&self, on_air: Seconds) -> Option<Seconds> {
+        self.duty_cycle.map(|share| Seconds::trusted(on_air.value() / share))
     }
 
     /// Duration of a symbol.
@@ -76,10 +95,15 @@ impl Lora {
     /// # Errors
     /// If `share` is not above 0 and at most 1.
     pub fn pause(on_air: Seconds, share: f64) -> Result<Seconds, ArgumentError> {
-        if !(share > 0.0 && share <= 1.0) {
-            return Err(ArgumentError::new("duty cycle", share, "above 0, at most 1"));
-        }
-        Seconds::new(on_air.value() / share - on_air.value())
+        Seconds::new(on_air.value() / checked_share(share)? - on_air.value())
+    }
+}
+
+fn checked_share(share: f64) -> Result<f64, ArgumentError> {
+    if share > 0.0 && share <= 1.0 {
+        Ok(share)
+    } else {
+        Err(ArgumentError::new("duty cycle", share, "above 0, at most 1"))
     }
 }
 

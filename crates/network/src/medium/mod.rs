@@ -2,6 +2,7 @@
 
 pub(crate) mod air;
 pub(crate) mod channel;
+mod duty;
 pub(crate) mod field;
 pub(crate) mod lora;
 pub(crate) mod loss;

@@ -77,6 +77,9 @@ pub(super) struct State {
     pub(super) out_until: Vec<Instant>,
     /// For each node the time until which the medium around it is in use.
     pub(super) busy_until: Vec<Instant>,
+    /// Until when nodes must be silent by their duty cycle.
+    #[serde(default)]
+    pub(super) quiet_until: BTreeMap<SensorId, Instant>,
     pub(super) batches: BTreeMap<(SensorId, Option<SensorId>), Batch>,
     pub(super) outgoing: BTreeMap<u32, Outgoing>,
     /// Next number of a batch or outgoing frame; they share one sequence.
@@ -118,6 +121,7 @@ impl SimulatorCore {
                 alive: vec![true; nodes],
                 out_until: vec![Instant::default(); nodes],
                 busy_until: vec![Instant::default(); nodes],
+                quiet_until: BTreeMap::new(),
                 batches: BTreeMap::new(),
                 outgoing: BTreeMap::new(),
                 next_number: 0,
@@ -154,6 +158,7 @@ impl SimulatorCore {
             && (0..nodes).all(|node| state.alive[node] == state.ledger.accounts[node].died.is_none())
             && state.out_until.len() == nodes
             && state.busy_until.len() == nodes
+            && state.quiet_until.keys().all(|node| known(*node))
             && state.queue.is_consistent(known)
             && state.batches.keys().all(|(from, to)| reached(*from, *to))
             && state.outgoing.values().all(|frame| reached(frame.from, frame.to))

@@ -146,6 +146,10 @@ impl<P: Protocol> Simulator<P> {
                 let tickets = self.core.acknowledged(id, frame);
                 self.tell(id, &tickets, P::on_ack)
             }
+            EventKind::Resume(frame) => {
+                self.core.resume(frame);
+                Ok(())
+            }
             EventKind::AckTimeout(frame) => {
                 let tickets = self.core.ack_timeout(frame);
                 self.tell(id, &tickets, P::on_give_up)

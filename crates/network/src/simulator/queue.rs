@@ -22,6 +22,8 @@ pub(crate) enum EventKind {
     Acknowledged(u32),
     /// The sender's wait for the acknowledgement of an outgoing frame is over. No effect if it arrived.
     AckTimeout(u32),
+    /// The sender of an outgoing frame may send again by its duty cycle.
+    Resume(u32),
 }
 
 impl EventKind {
@@ -35,6 +37,7 @@ impl EventKind {
             Self::Transmit(frame) => (4, frame),
             Self::Acknowledged(frame) => (5, frame),
             Self::AckTimeout(frame) => (6, frame),
+            Self::Resume(frame) => (7, frame),
         }
     }
 }
@@ -68,7 +71,8 @@ impl Event {
             3 => EventKind::Flush(self.argument),
             4 => EventKind::Transmit(self.argument),
             5 => EventKind::Acknowledged(self.argument),
-            _ => EventKind::AckTimeout(self.argument),
+            6 => EventKind::AckTimeout(self.argument),
+            _ => EventKind::Resume(self.argument),
         }
     }
 }
@@ -240,6 +244,7 @@ mod tests {
             EventKind::Transmit(4),
             EventKind::Acknowledged(5),
             EventKind::AckTimeout(6),
+            EventKind::Resume(8),
         ];
         for kind in all {
             assert_eq!(Event::new(Instant(1), 1 << 60, SensorId(2), kind).kind(), kind);

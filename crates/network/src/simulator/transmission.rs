@@ -6,6 +6,7 @@
 //! Transmit:      one attempt: draw what arrives, charge, schedule arrivals; with acknowledgements also AckTimeout
 //! arrival:       the receiver's radio answers an intact frame after a turnaround; Acknowledged when the answer is back
 //! AckTimeout:    dispatch again, or give up after the last repetition
+//! Resume:        dispatch what came while the sender had to be silent by its duty cycle
 //! ```
 //! By the ideal schedule a transmission begins when the medium is free around the sender and around all nodes that hear it. Requests are
 //! served in the order in which they were made. A waiting node sleeps.
@@ -98,6 +99,12 @@ impl SimulatorCore {
         }
         let size = self.size(from, frames);
         let contends = self.contends();
+        if let Some(resume) = self.quiet(from) {
+            let number = self.next_number();
+            self.state.outgoing.insert(number, outgoing(from, to, frames, tickets));
+            self.schedule(resume, from, EventKind::Resume(number));
+            return;
+        }
         let start = match contends {
             true => self.state.now,
             false => self.book(from, size.air, acknowledged),
@@ -117,22 +124,47 @@ impl SimulatorCore {
             return;
         }
         let number = self.next_number();
-        let outgoing = Outgoing {
-            from,
-            to,
-            frames: frames.to_vec(),
-            tickets: tickets.to_vec(),
-            attempts: 0,
-            heard: 0,
-            sender_awake: false,
-            receiver_awake: false,
-        };
+        let outgoing = outgoing(from, to, frames, tickets);
         if contends {
             self.contend(number, outgoing);
             return;
         }
         self.state.outgoing.insert(number, outgoing);
         self.transmit_at(start, from, number);
+    }
+
+    /// The time until which a node must be silent by its duty cycle, if that is to come.
+    fn quiet(&self, node: SensorId) -> Option<Instant> {
+        let until = self.state.quiet_until.get(&node).copied();
+        until.filter(|until| *until > self.state.now)
+    }
+
+    /// A node sends from `start` on: its next frame waits as its duty cycle says.
+    fn keep_duty(&mut self, node: SensorId, start: Instant, air: Bits) {
+        let radio = self.setup.radio_of(node);
+        if let Some(period) = radio.lora.and_then(|lora| lora.period(radio.duration(air))) {
+            self.state.quiet_until.insert(node, start.after(period));
+        }
+    }
+
+    /// The duty cycle lets an outgoing frame begin, unless another of its sender was first.
+    pub(super) fn resume(&mut self, number: u32) {
+        let Some(outgoing) = self.state.outgoing.get_mut(&number) else {
+            return;
+        };
+        (outgoing.sender_awake, outgoing.receiver_awake) = (false, false);
+        let (from, acknowledged) = (outgoing.from, outgoing.to.is_some() && self.setup.retries.is_some());
+        if let Some(resume) = self.quiet(from) {
+            self.schedule(resume, from, EventKind::Resume(number));
+        } else if self.contends() {
+            if let Some(outgoing) = self.state.outgoing.remove(&number) {
+                self.contend(number, outgoing);
+            }
+        } else if let Some(outgoing) = self.state.outgoing.get(&number) {
+            let air = self.size(from, &outgoing.frames).air;
+            let start = self.book(from, air, acknowledged);
+            self.transmit_at(start, from, number);
+        }
     }
 
     fn transmit_at(&mut self, start: Instant, from: SensorId, number: u32) {
@@ -151,6 +183,13 @@ impl SimulatorCore {
         self.drain(from);
         let acknowledged = self.is_acknowledged(to);
         let size = self.size(from, &outgoing.frames);
+        if self.contends()
+            && let Some(resume) = self.quiet(from)
+        {
+            self.state.outgoing.insert(number, outgoing);
+            self.schedule(resume, from, EventKind::Resume(number));
+            return;
+        }
         let mut sends = self.listens(from);
         let mut listened = false;
         if sends && self.hears_others(from) {
@@ -163,6 +202,9 @@ impl SimulatorCore {
         }
         outgoing.heard = 0;
         if sends {
+            if self.contends() {
+                self.keep_duty(from, self.state.now, size.air);
+            }
             listened = self.attempt(&Attempt {
                 from,
                 to,
@@ -213,6 +255,10 @@ impl SimulatorCore {
                 .outgoing
                 .remove(&number)
                 .map_or_else(Vec::new, |frame| frame.tickets);
+        }
+        if let Some(resume) = self.quiet(from) {
+            self.schedule(resume, from, EventKind::Resume(number));
+            return Vec::new();
         }
         if self.contends() {
             if let Some(outgoing) = self.state.outgoing.remove(&number) {
@@ -311,6 +357,7 @@ impl SimulatorCore {
         }
         busy[from.index()] = end;
         neighbours.iter().for_each(|node| busy[*node as usize] = end);
+        self.keep_duty(from, start, air);
         start
     }
 
@@ -329,6 +376,20 @@ impl SimulatorCore {
                 Instant(answered.after(delay).0.saturating_add(1))
             }
         }
+    }
+}
+
+/// Frames that wait to be sent for the first time.
+fn outgoing(from: SensorId, to: Option<SensorId>, frames: &[BitString], tickets: &[Ticket]) -> Outgoing {
+    Outgoing {
+        from,
+        to,
+        frames: frames.to_vec(),
+        tickets: tickets.to_vec(),
+        attempts: 0,
+        heard: 0,
+        sender_awake: false,
+        receiver_awake: false,
     }
 }
 

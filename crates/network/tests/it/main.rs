@@ -13,6 +13,7 @@ mod bit_star;
 mod books;
 mod contention;
 mod defects;
+mod duty;
 mod faults;
 mod lossless;
 mod scale;
