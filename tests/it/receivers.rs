@@ -47,9 +47,8 @@ fn receive<F: ScalarFilter>(filter: &F) -> Agreement {
         special = next;
         bits += info.bits;
         log_likelihoods[0] += info.log_likelihood;
-        let (next, log_likelihood) = referee.step(&exact, &observed).unwrap();
-        exact = next;
-        log_likelihoods[1] += log_likelihood;
+        exact = referee.predict(&exact).unwrap();
+        log_likelihoods[1] += exact.update(&observed).unwrap();
         let step = particle.step_in_place(&mut cloud_rng, plant.dynamics(), &mut cloud, &[&observed]);
         log_likelihoods[2] += step.unwrap().log_likelihood;
     }

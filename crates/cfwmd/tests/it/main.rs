@@ -83,7 +83,7 @@ impl Silence {
         Censored::silence(&rule, &centre, &noise, &Link::lossy(self.loss).unwrap(), self.count).unwrap()
     }
 
-    fn moments(&self, mean: f64, variance: f64) -> Result<Tilted<1>, fewbits_core::Error> {
+    fn moments(&self, mean: f64, variance: f64) -> Result<Tilted<1>, Error> {
         fewbits_core::Factor::tilted(&self.factor(), &Gaussian::scalar(mean, variance).unwrap())
     }
 }

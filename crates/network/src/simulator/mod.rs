@@ -147,7 +147,7 @@ impl<P: Protocol> Simulator<P> {
                 self.tell(id, &tickets, P::on_ack)
             }
             EventKind::Resume(frame) => {
-                self.core.resume(frame);
+                self.core.resume_frame(frame);
                 Ok(())
             }
             EventKind::AckTimeout(frame) => {

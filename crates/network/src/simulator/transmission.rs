@@ -148,7 +148,7 @@ impl SimulatorCore {
     }
 
     /// The duty cycle lets an outgoing frame begin, unless another of its sender was first.
-    pub(super) fn resume(&mut self, number: u32) {
+    pub(super) fn resume_frame(&mut self, number: u32) {
         let Some(outgoing) = self.state.outgoing.get_mut(&number) else {
             return;
         };
