@@ -123,13 +123,27 @@ impl Room {
         std::array::from_fn(|axis| point[axis] - self.corner[axis])
     }
 
-    /// The domain of all layers. Solid cells and the sides are closed; air passes out at outlets on the sides.
+    /// The domain of all layers. Solid cells and the sides are closed; air passes out at outlets on the sides in x and y. An outlet
+    /// elsewhere, as in a room whose outer walls are cells, is no air: what reaches its faces has left.
     ///
     /// # Errors
     /// If no cell is free.
     pub fn domain(&self) -> Result<Domain, Error> {
         let grid = Grid::uniform(&self.counts, self.width)?;
-        Domain::new(grid, &self.cells, [[Boundary::Closed; 2]; 3])
+        let is_on_a_side = |cell: usize| {
+            let place = grid.place(cell);
+            (0..2).any(|axis| place[axis] == 0 || place[axis] + 1 == self.counts[axis])
+        };
+        let cells: Vec<Cell> = self
+            .cells
+            .iter()
+            .enumerate()
+            .map(|(at, cell)| match cell {
+                Cell::Open(boundary) if !is_on_a_side(at) => Cell::Blocked(*boundary),
+                other => *other,
+            })
+            .collect();
+        Domain::new(grid, &cells, [[Boundary::Closed; 2]; 3])
     }
 
     /// The mean of a table's values in each free cell of the domain, `None` where the table has no row. Rows of other cells are left out.

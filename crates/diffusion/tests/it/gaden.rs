@@ -107,6 +107,26 @@ fn averages_are_the_means_of_what_was_written() {
     assert_eq!((found[0], found.iter().flatten().count()), (Some(4.0), 1));
 }
 
+/// A corridor whose walls are cells, as the simulator writes rooms: the outlet at its end is not on a side of the grid.
+#[test]
+fn an_outlet_within_walls_lets_the_gas_out() {
+    let wall = "1 1 1\n".repeat(5) + ";\n";
+    let corridor = "1 1 1\n1 0 1\n1 0 1\n1 2 1\n1 1 1\n;\n";
+    let head = "#env_min(m) 0 0 0\n#env_max(m) 2.5 1.5 1.5\n#num_cells 5 3 3\n#cell_size(m) 0.5\n";
+    let domain = Room::parse(&format!("{head}{wall}{corridor}{wall}"))
+        .unwrap()
+        .domain()
+        .unwrap();
+    assert_eq!(domain.free().len(), 2);
+    let still = fewbits_diffusion::Flow::still(&domain);
+    let transport = Transport::new(domain.clone(), 0.1, &still, 0.0, Scheme::default()).unwrap();
+    let patch = domain.point([0.75; 3]).unwrap();
+    let steady = Steady::new(&transport).unwrap();
+    let concentration = steady.concentration(&[Source { patch, rate: 1.0 }]).unwrap();
+    // All that is released passes 0.25 m^2 between two centres that are 0.5 m apart.
+    assert!((concentration[0] - concentration[1] - 20.0).abs() < 1e-6, "{concentration:?}");
+}
+
 #[test]
 fn what_is_wrong_is_named() {
     let room = |from: &str, to: &str| Room::parse(&room_text().replacen(from, to, 1)).unwrap_err().to_string();
@@ -143,9 +163,16 @@ fn files_of_the_simulator_are_read() {
     let text = read("FEWBITS_GADEN_ROOM");
     let room = Room::parse(&text).unwrap();
     let domain = room.domain().unwrap();
-    let cells = text.lines().skip(4).flat_map(str::split_whitespace);
-    let air = cells.filter(|word| matches!(*word, "0" | "2")).count();
-    assert_eq!(domain.free().len(), air);
+    let count = |wanted: &str| {
+        text.lines()
+            .skip(4)
+            .flat_map(str::split_whitespace)
+            .filter(|word| *word == wanted)
+            .count()
+    };
+    // Of the outlets those on the sides.
+    let air = domain.free().len();
+    assert!((count("0")..=count("0") + count("2")).contains(&air), "{air}");
     let wind = Table::parse(&read("FEWBITS_GADEN_WIND")).unwrap();
     let velocities = room.wind(&domain, &wind).unwrap().velocities(&domain);
     let fastest = velocities.iter().flatten().fold(0.0, |most: f64, v| most.max(v.abs()));
