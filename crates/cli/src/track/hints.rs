@@ -18,6 +18,8 @@ const FEWEST: usize = 3;
 /// The same of a table of single reports, in which silence is not seen.
 const FEWEST_ROWS: usize = 10;
 const EMPTY: f64 = 0.5;
+/// The longest interval between values in shortest ones, where values come when they have changed.
+const IRREGULAR: f64 = 3.0;
 /// An offset is told if it is this many of the sensor's deviations.
 const LARGE: f64 = 1.0;
 
@@ -35,12 +37,13 @@ pub(super) fn hints(
         return lines;
     }
     for (sensor, name) in names.iter().enumerate() {
-        let cells: Vec<Option<f64>> = first
-            .iter()
-            .flat_map(|instant| &instant.reports)
-            .filter(|(other, _)| *other == sensor)
-            .map(|(_, cell)| cell.filter(|cell| cell.is_finite()))
-            .collect();
+        let own = |instant: &Instant| -> Vec<(f64, Option<f64>)> {
+            let own = instant.reports.iter().filter(|(other, _)| *other == sensor);
+            own.map(|(_, cell)| (instant.seconds, cell.filter(|cell| cell.is_finite())))
+                .collect()
+        };
+        let timed: Vec<(f64, Option<f64>)> = first.iter().flat_map(own).collect();
+        let cells: Vec<Option<f64>> = timed.iter().map(|one| one.1).collect();
         let values: Vec<f64> = cells.iter().copied().flatten().collect();
         let steps: Vec<f64> = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
         let is_long = options.table.by.is_some();
@@ -49,7 +52,11 @@ pub(super) fn hints(
         let typical = median(steps.clone());
         if options.silent_within.is_none()
             && values.len() >= if is_long { FEWEST_ROWS } else { FEWEST }
-            && (is_long || silent > EMPTY * cells.len() as f64)
+            && if is_long {
+                is_irregular(&timed)
+            } else {
+                silent > EMPTY * cells.len() as f64
+            }
             && least > 0.5 * typical
         {
             lines.push(format!(
@@ -76,6 +83,14 @@ pub(super) fn hints(
         lines.push(format!("the first rows have a slope: {what}"));
     }
     lines
+}
+
+/// Whether the intervals between values differ by so much that values come when they have changed.
+fn is_irregular(timed: &[(f64, Option<f64>)]) -> bool {
+    let times: Vec<f64> = timed.iter().filter(|one| one.1.is_some()).map(|one| one.0).collect();
+    let intervals = || times.windows(2).map(|pair| pair[1] - pair[0]);
+    let (short, long) = (intervals().fold(f64::INFINITY, f64::min), intervals().fold(0.0, f64::max));
+    long > IRREGULAR * short
 }
 
 /// Values of a sensor of which the period is asked.
