@@ -40,6 +40,7 @@
 
 mod ar1;
 mod auto;
+mod beside;
 mod constant_velocity;
 mod continuous;
 pub mod diffusion;

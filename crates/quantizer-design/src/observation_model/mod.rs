@@ -8,6 +8,7 @@
 //! than any power of the step for these integrands; Gauss-Hermite rules need many more nodes if the noise is narrower than the
 //! prior. Densities on an interval use Gauss-Legendre panels. A discrete prior is its own rule.
 
+mod by_function;
 mod nodes;
 mod noise;
 mod prior;

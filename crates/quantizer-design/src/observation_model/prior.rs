@@ -2,7 +2,6 @@
 
 use super::sample::{SampleFit, drawn_together, fitted};
 use crate::error::{Error, refuse};
-use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one, entries, finite, positive, probabilities, within};
 use fewbits_numerics::quadrature::gauss_legendre;
 use serde::{Deserialize, Serialize};
@@ -11,8 +10,6 @@ use std::ops::RangeInclusive;
 /// Number of panels, and of nodes per panel, of the table in which a density function is stored.
 pub(super) const TABLE_PANELS: usize = 64;
 pub(super) const TABLE_NODES: usize = 12;
-/// Largest relative difference between the integrals by half of the panels and by all; a rougher function is an error.
-const ROUGHNESS: f64 = 1e-6;
 
 /// Prior of the scalar unknown, in any unit.
 ///
@@ -189,38 +186,6 @@ impl Prior {
         Self::density_by(|nodes| Ok(nodes.iter().map(|x| density(*x)).collect()), support)
     }
 
-    /// As [`density`](Self::density), for a function that takes all nodes at once and may fail. It returns one number per node.
-    ///
-    /// # Errors
-    /// As [`density`](Self::density), those of the function, or if it returns another number of values.
-    pub fn density_by<E: From<Error>>(
-        density: impl FnOnce(&[f64]) -> Result<Vec<f64>, E>,
-        support: RangeInclusive<f64>,
-    ) -> Result<Self, E> {
-        let (low, high) = support.into_inner();
-        check_interval(low, high)?;
-        let rule = gauss_legendre::<TABLE_NODES>();
-        let panels = [TABLE_PANELS, TABLE_PANELS / 2];
-        let nodes: Vec<(f64, f64)> = panels
-            .iter()
-            .flat_map(|panels| rule.panels(low, high, *panels))
-            .collect();
-        let places: Vec<f64> = nodes.iter().map(|(x, _)| *x).collect();
-        let mut densities = density(&places)?;
-        entries("density", densities.len(), places.len()).map_err(Error::from)?;
-        let fine = TABLE_PANELS * TABLE_NODES;
-        let weighed = densities.iter().zip(&nodes).map(|(p, (_, weight))| p.max(0.0) * weight);
-        let weighed: Vec<f64> = weighed.collect();
-        let (whole, half) = (weighed[..fine].iter().sum::<f64>(), weighed[fine..].iter().sum::<f64>());
-        densities.truncate(fine);
-        let found: Self = Shape::Table { low, high, densities }.try_into()?;
-        if (half - whole).abs() > ROUGHNESS * whole {
-            let given = format!("integrals {half} and {whole} by 32 and 64 panels");
-            return Err(Error::from(ArgumentError::new("density", given, "a smooth function")).into());
-        }
-        Ok(found)
-    }
-
     /// A mixture of normal densities, each given as `(weight, mean, standard deviation)`.
     ///
     /// # Errors
@@ -329,7 +294,7 @@ impl Prior {
     }
 }
 
-fn check_interval(low: f64, high: f64) -> Result<(), Error> {
+pub(super) fn check_interval(low: f64, high: f64) -> Result<(), Error> {
     finite("low", low)?;
     finite("high", high)?;
     if low >= high || !(high - low).is_finite() {
