@@ -263,9 +263,8 @@ impl Table {
                 },
                 &mut self.words[*column],
             );
-            if let Err((problem, mend)) = pushed
-                && !self.push_limit(batch, i, *column)
-            {
+            let Err((problem, mend)) = pushed else { continue };
+            if !self.push_limit(batch, i, *column) {
                 return Err(self.cell_refused(*column, problem, mend));
             }
         }
