@@ -1,8 +1,8 @@
 //! Likelihood of the samples of the visited nodes as a function of the position of the source.
 
 use crate::rate::{Intervals, RateModel, RateSums};
-use crate::{Error, Record};
-use fewbits_core::{Columns, Likelihood};
+use crate::record::Record;
+use fewbits_core::{Columns, Error, Likelihood};
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::normal::log_interval;
 use nalgebra::{SVector, Vector2};

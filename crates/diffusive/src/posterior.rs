@@ -3,10 +3,10 @@
 use crate::belief::Prior;
 use crate::density::{CellOptions, Cells};
 use crate::fit::Fit;
+use crate::likelihood::SourceLikelihood;
 use crate::search_box::SearchBox;
 use crate::target::Target;
-use crate::{Error, SourceLikelihood};
-use fewbits_core::{Belief, Gaussian};
+use fewbits_core::{Belief, Error, Gaussian};
 use fewbits_mixture_codec::Clumps;
 use nalgebra::{Vector2, Vector3};
 

@@ -1,7 +1,8 @@
 //! The samples of one node, with tabulated responses for fast likelihoods.
 
 use crate::rate::RateSums;
-use crate::{Error, SourceSensor};
+use crate::sensor::SourceSensor;
+use fewbits_core::Error;
 use fewbits_models::diffusion::Profile;
 use fewbits_models::{Homogeneous, Receptor};
 use fewbits_numerics::error::{all_finite, entries, positive};

@@ -2,9 +2,9 @@
 
 use crate::belief::{JointBelief, PositionBelief, Prior};
 use crate::density::{CellTarget, Cells};
+use crate::likelihood::SourceLikelihood;
 use crate::rate::{Intervals, RateModel, RateRange, RateSums, cut_normal, ends_about};
-use crate::{Error, SourceLikelihood};
-use fewbits_core::Columns;
+use fewbits_core::{Columns, Error};
 use fewbits_numerics::{LogSum, kernels::largest, normal::log_interval};
 use nalgebra::{Matrix2, Vector2};
 
