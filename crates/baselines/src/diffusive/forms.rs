@@ -14,6 +14,7 @@ use fewbits_diffusive::{
 use fewbits_mixture_codec::{Clumps, MixtureFit};
 use fewbits_numerics::error::refuse;
 use nalgebra::{SVector, Vector2};
+use std::fmt;
 use std::sync::Arc;
 
 /// Number of clumps that a mixture is fitted to.
@@ -37,17 +38,28 @@ pub const fn particles<const N: usize>() -> Form {
 /// place; the form exists to show that.
 pub const LAPLACE: Form = Form::Other(Added(&LaplaceForm));
 
-#[derive(Debug)]
 struct LpgForm<const N: usize, const K: usize>;
 
-#[derive(Debug)]
 struct ParticlesForm<const N: usize>;
 
 #[derive(Debug)]
 struct LaplaceForm;
 
+// Forms are equal if they are written alike, so the parameters are written.
+impl<const N: usize, const K: usize> fmt::Debug for LpgForm<N, K> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "Lpg {{ components: {N}, degree: {K} }}")
+    }
+}
+
+impl<const N: usize> fmt::Debug for ParticlesForm<N> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "Particles({N})")
+    }
+}
+
 /// Refuses a rate that is part of the belief.
-fn position_only(form: &impl std::fmt::Debug, rate: &RateModel) -> Result<(), Error> {
+fn position_only(form: &impl fmt::Debug, rate: &RateModel) -> Result<(), Error> {
     match rate {
         RateModel::Joint(_) => refuse("form", format!("{form:?}"), "Raw, Gaussian, Mixture or Lpg with a joint rate"),
         _ => Ok(()),
