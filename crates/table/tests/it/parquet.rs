@@ -195,3 +195,22 @@ fn every_flipped_bit_is_an_error_or_values() {
     }
     assert!(refused > 100, "{refused}");
 }
+
+/// A file of pyarrow with the checksums of its pages: no flipped bit of a value passes.
+#[test]
+fn pages_that_disagree_with_their_checksum_are_refused() {
+    let bytes = include_bytes!("../fixtures/checksums.parquet");
+    let values = [1.5_f64, 2.5, 3.5];
+    assert_eq!(numbers(&all(&mut open(bytes.to_vec())), 0), values.map(Some));
+    let first = bytes
+        .windows(8)
+        .position(|eight| eight == 1.5_f64.to_le_bytes())
+        .unwrap();
+    for bit in 8 * first..8 * (first + 8 * values.len()) {
+        let mut damaged = bytes.to_vec();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        let read = Table::open_parquet(bytes::Bytes::from(damaged), &Dialect::default())
+            .and_then(|mut table| table.read(&mut Batch::default(), 10));
+        assert!(read.is_err(), "bit {bit}");
+    }
+}
