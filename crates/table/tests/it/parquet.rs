@@ -201,7 +201,7 @@ fn every_flipped_bit_is_an_error_or_values() {
 fn pages_that_disagree_with_their_checksum_are_refused() {
     let bytes = include_bytes!("../fixtures/checksums.parquet");
     let values = [1.5_f64, 2.5, 3.5];
-    assert_eq!(numbers(&all(&mut open(bytes.to_vec())), 0), values.map(Some));
+    assert_eq!(numbers(&all(&mut open(bytes.to_vec())).columns[0]), values.map(Some));
     let first = bytes
         .windows(8)
         .position(|eight| eight == 1.5_f64.to_le_bytes())
