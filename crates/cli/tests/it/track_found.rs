@@ -183,7 +183,7 @@ fn single_reports(seed: u64) -> (String, Vec<f64>) {
 /// A value that has just crossed the width is off by its noise, always outwards, so the bands of these rows hold less than they say.
 #[test]
 fn silence_between_single_reports_says_something() {
-    let [mut squared, mut kept] = [[0.0_f64; 2], [0; 2]];
+    let (mut squared, mut kept) = ([0.0_f64; 2], [0; 2]);
     let mut count = 0;
     for seed in 44..50 {
         let (table, truth) = single_reports(seed);
