@@ -39,8 +39,7 @@ fn centre<F: StateFilter<2>>(filter: F, rate: f64) -> FusionCentre<2, F> {
     centre
 }
 
-/// What arrives in slot `k` of all sensors: values, silence, and losses that were noticed. A centre takes a noticed loss with the reports and silence
-/// after them, the likelihoods of an instant take both at once, so where a slot has both the losses are not noticed.
+/// What arrives in slot `k` of all sensors: values, silence, and losses that were noticed.
 fn observed(
     k: u64,
     rules: &[fewbits_cfwmd::rule::CensoringRule<1>],
@@ -54,16 +53,10 @@ fn observed(
         .iter()
         .map(|sensor| sensor.sample(&mut rng, &truth))
         .collect();
-    let mut observed = network
+    network
         .transmit(&mut rng, rules, predicted.mean(), &measurements)
         .unwrap()
-        .0;
-    if observed.contains(&Observation::Nothing) {
-        for one in observed.iter_mut().filter(|one| **one == Observation::Lost) {
-            *one = Observation::Nothing;
-        }
-    }
-    observed
+        .0
 }
 
 fn agree(one: &Gaussian<2>, other: &Gaussian<2>) {

@@ -25,6 +25,11 @@ struct Bundle<'a> {
     counted: Vec<(&'a Slot, usize)>,
 }
 
+/// Whether two sensors work with the same probability but for rounding, by which their different histories may part them.
+fn works_alike(one: f64, other: f64) -> bool {
+    (one - other).abs() <= 1e-12
+}
+
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// The parts of these slots, each with its seat and the probability that its sensor works; empty if no sensor is in a group.
     pub(super) fn joined<'a>(
@@ -36,8 +41,9 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             let Some(group) = self.members[seat].group else {
                 continue;
             };
-            let is_same =
-                |one: &Bundle<'_>| one.group == group && one.working == working && *one.feedback == slot.feedback;
+            let is_same = |one: &Bundle<'_>| {
+                one.group == group && works_alike(one.working, working) && *one.feedback == slot.feedback
+            };
             let at = bundles.iter().position(is_same).unwrap_or(bundles.len());
             if at == bundles.len() {
                 bundles.push(Bundle {
@@ -99,7 +105,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         let (first, second) = (&self.members[one.seat], &self.members[other.seat]);
         first.group.is_some()
             && first.group == second.group
-            && first.state.presence.working == second.state.presence.working
+            && works_alike(first.state.presence.working, second.state.presence.working)
             && one.slot.feedback == other.slot.feedback
     }
 
