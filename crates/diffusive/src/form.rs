@@ -61,7 +61,7 @@ pub trait AddedForm: Debug + Send + Sync {
     }
 }
 
-/// An added form in [`Form::Other`](Form::Other). Two are equal if they are printed alike.
+/// An added form in [`Form::Other`]. Two are equal if they are printed alike.
 #[derive(Debug, Clone, Copy)]
 pub struct Added(pub &'static dyn AddedForm);
 
