@@ -126,6 +126,7 @@ pub fn all() -> Vec<&'static dyn AnyFigure> {
         &diffusive::envelope::Envelope,
         &diffusive::unknowns::Unknowns,
         &diffusive::rooms::Rooms,
+        &diffusive::ranks::Ranks,
         &handoff::fig2::Fig2,
         &handoff::fig3::Fig3,
         &handoff::fig4::Fig4,

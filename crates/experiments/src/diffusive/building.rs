@@ -18,7 +18,7 @@ const DIFFUSIVITY: f64 = 0.05;
 /// Wind from door to window, m^2/s.
 const WIND: f64 = 0.15;
 /// Rates that the source may have, kg/s per metre of height.
-const RATES: [f64; 2] = [0.5, 1.5];
+pub(super) const RATES: [f64; 2] = [0.5, 1.5];
 /// Rates that fit free space: its concentrations are of another size.
 const FREE_RATES: [f64; 2] = [0.3, 30.0];
 
@@ -81,9 +81,10 @@ pub(super) struct Placement<'a> {
     pub(super) sensors: Vec<usize>,
     pub(super) source: usize,
     /// Responses of each sensor to a source in each cell: of the building, and of free space.
-    responses: [Vec<Vec<f64>>; 2],
-    readings: Vec<Vec<f64>>,
-    instrument: Instrument,
+    pub(super) responses: [Vec<Vec<f64>>; 2],
+    /// Concentrations with noise, of each sensor several.
+    pub(super) readings: Vec<Vec<f64>>,
+    pub(super) instrument: Instrument,
 }
 
 impl<'a> Placement<'a> {

@@ -8,6 +8,7 @@ pub(crate) mod chains;
 mod common;
 pub(crate) mod envelope;
 mod plan_belief;
+pub(crate) mod ranks;
 pub(crate) mod rooms;
 pub(crate) mod route;
 mod summary;

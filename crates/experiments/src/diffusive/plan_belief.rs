@@ -97,15 +97,24 @@ impl PlanBelief {
     ) -> Result<Self, ArgumentError> {
         let (logs, misfit) = match report {
             Report::Value => of_values(instrument, rates, sensed)?,
-            Report::Word => of_words(instrument, rates, sensed),
+            Report::Word => {
+                let words = |readings: &Vec<f64>| readings.iter().map(|y| instrument.word(*y)).collect();
+                let words: Vec<Vec<usize>> = sensed.1.iter().map(words).collect();
+                of_words(instrument, rates, (sensed.0, &words), f64::NEG_INFINITY)
+            }
         };
+        Ok(Self::of_logs(&logs, misfit))
+    }
+
+    /// The belief whose logarithms, up to a constant, are given.
+    pub fn of_logs(logs: &[f64], misfit: f64) -> Self {
         let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let mut weights: Vec<f64> = logs.iter().map(|log| (log - largest).exp()).collect();
         let total: f64 = weights.iter().sum();
         weights.iter_mut().for_each(|weight| *weight /= total);
         let mode = (0..weights.len()).max_by(|a, b| weights[*a].total_cmp(&weights[*b]));
         let mode = mode.unwrap_or(0);
-        Ok(Self { weights, mode, misfit })
+        Self { weights, mode, misfit }
     }
 
     /// The mass of the cells that are more probable than this one, and of this one.
@@ -135,17 +144,24 @@ fn of_values(
     Ok((logs, (smallest - freedom) / (2.0 * freedom).sqrt()))
 }
 
-fn of_words(instrument: &Instrument, [low, high]: [f64; 2], (responses, readings): Sensed<'_>) -> (Vec<f64>, f64) {
+/// Logarithm of each cell's likelihood, averaged over the rate, and the misfit, of sensors that each sent some words.
+/// Cells that are far below `known`, a logarithm that another model reached, have no weight either.
+pub(super) fn of_words(
+    instrument: &Instrument,
+    [low, high]: [f64; 2],
+    (responses, words): (&[Vec<f64>], &[Vec<usize>]),
+    known: f64,
+) -> (Vec<f64>, f64) {
     // One row for each sensor: all its words together.
-    let row = |readings: &Vec<f64>| {
+    let row = |words: &Vec<usize>| {
         let mut row = vec![0.0; NODES];
-        for word in readings.iter().map(|y| instrument.word(*y)) {
-            let logs = row.iter_mut().zip(&instrument.table[word]);
+        for word in words {
+            let logs = row.iter_mut().zip(&instrument.table[*word]);
             logs.for_each(|(sum, log)| *sum += log);
         }
         row
     };
-    let rows: Vec<Vec<f64>> = readings.iter().map(row).collect();
+    let rows: Vec<Vec<f64>> = words.iter().map(row).collect();
     // Nodes in the logarithm of the rate, weighted by the uniform density.
     let count = ((high / low).ln() / RATE_STEP).ceil() as usize;
     let rate = |k: usize| low * (high / low).powf((k as f64 + 0.5) / count as f64);
@@ -166,7 +182,7 @@ fn of_words(instrument: &Instrument, [low, high]: [f64; 2], (responses, readings
     };
     let mut open: Vec<(f64, usize, Vec<f64>)> = (0..responses[0].len()).map(begin).collect();
     open.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let (mut best, mut logs) = ((f64::NEG_INFINITY, 0, 1.0), vec![f64::NEG_INFINITY; responses[0].len()]);
+    let (mut best, mut logs) = ((known, 0, 1.0), vec![f64::NEG_INFINITY; responses[0].len()]);
     for (mut bound, cell, mut terms) in open {
         let mut done = first;
         while done < rows.len() && bound > best.0 - NEGLIGIBLE {
@@ -188,14 +204,14 @@ fn of_words(instrument: &Instrument, [low, high]: [f64; 2], (responses, readings
     // The logarithm of the likelihood has known moments if the best cell and rate are true.
     let (log, cell, rate) = best;
     let (mut mean, mut variance) = (0.0, 0.0);
-    for (responses, readings) in responses.iter().zip(readings) {
+    for (responses, words) in responses.iter().zip(words) {
         let terms = |p: f64| [p * p.ln(), p * p.ln().powi(2)];
         let entropy = instrument
             .words(rate * responses[cell])
             .map(|p| if p > 0.0 { terms(p) } else { [0.0; 2] });
         let first: f64 = entropy.iter().map(|e| e[0]).sum();
-        mean += readings.len() as f64 * first;
-        variance += readings.len() as f64 * (entropy.iter().map(|e| e[1]).sum::<f64>() - first * first);
+        mean += words.len() as f64 * first;
+        variance += words.len() as f64 * (entropy.iter().map(|e| e[1]).sum::<f64>() - first * first);
     }
     (logs, (mean - log) / variance.max(f64::MIN_POSITIVE).sqrt())
 }
@@ -215,7 +231,11 @@ mod tests {
         let response = |sensor| (0..cells).map(move |cell| 1.0 / (1.0 + 0.02 * distance(sensor, cell).powi(2)));
         let responses: Vec<Vec<f64>> = (0..20).map(|sensor| response(sensor).collect()).collect();
         let readings: Vec<Vec<f64>> = responses.iter().map(|a| vec![0.9 * a[31]; 3]).collect();
-        let (logs, _) = of_words(&instrument, rates, (&responses, &readings));
+        let words: Vec<Vec<usize>> = readings
+            .iter()
+            .map(|y| y.iter().map(|y| instrument.word(*y)).collect())
+            .collect();
+        let (logs, _) = of_words(&instrument, rates, (&responses, &words), f64::NEG_INFINITY);
         let count = ((rates[1] / rates[0]).ln() / RATE_STEP).ceil() as usize;
         let brute = |cell: usize| {
             let terms = (0..count).map(|k| {
