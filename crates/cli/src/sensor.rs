@@ -8,8 +8,9 @@ use crate::place::Place;
 use crate::private::{configuration, configured};
 use crate::report::Report;
 use crate::say::say;
+use crate::towards::Towards;
 use fewbits_core::{BitString, SensorNode};
-use fewbits_link::{Key, Program, SensorLink, Store, Udp, run_sensor};
+use fewbits_link::{Key, Program, SensorLink, Store, run_sensor};
 use fewbits_monte_carlo::Stream;
 use fewbits_protocol::{Feedback, Note, SensorSettings, Slot};
 use nalgebra::Vector1;
@@ -53,17 +54,50 @@ fn one() -> usize {
     1
 }
 
+/// What `sensor.toml` says, and its parts.
+struct Given {
+    configuration: Configuration,
+    node: Node,
+    key: Key,
+}
+
+/// Reads a file and names its first fault.
+fn read(file: &Path) -> Result<Given, Error> {
+    let configuration: Configuration = configuration(file)?;
+    let node = node(file, &configuration)?;
+    let key = Key::from_hex(&configuration.key).map_err(configured(file))?;
+    if !(configuration.deviation.is_finite() && configuration.deviation > 0.0) {
+        return Err(configured(file)(format!("deviation is {}: expected above 0", configuration.deviation)));
+    }
+    if let Place::Udp(address) = Place::of(&configuration.centre).map_err(configured(file))?
+        && address.ends_with(":0")
+    {
+        return Err(configured(file)(format!("centre is {address}: expected the port at which the centre listens")));
+    }
+    Ok(Given {
+        configuration,
+        node,
+        key,
+    })
+}
+
+/// Runs `check` for a sensor.
+pub(crate) fn check(file: &Path) -> Result<Ending, Error> {
+    let number = read(file)?.configuration.number;
+    crate::output::print(&format!("{}: no fault; sensor {number}\n", file.display()))?;
+    Ok(Ending::Good)
+}
+
 /// Runs the task until the samples end.
 pub(crate) fn run(options: &SensorOptions) -> Result<Ending, Error> {
     let file = &options.configuration;
-    let given: Configuration = configuration(file)?;
-    let node = node(file, &given)?;
+    let Given {
+        configuration: given,
+        node,
+        key,
+    } = read(file)?;
     let mut settings = SensorSettings::new(Feedback::Told);
     settings.heartbeat_after = given.heartbeat_after;
-    let key = Key::from_hex(&given.key).map_err(configured(file))?;
-    if !(given.deviation.is_finite() && given.deviation > 0.0) {
-        return Err(configured(file)(format!("deviation is {}: expected above 0", given.deviation)));
-    }
     if given.state.is_none() {
         say!(
             "note: no `state`: when this sensor starts again, its centre refuses it until it has a new key, and it accepts old \
@@ -85,11 +119,12 @@ pub(crate) fn run(options: &SensorOptions) -> Result<Ending, Error> {
     };
     match Place::of(&given.centre).map_err(configured(file))? {
         Place::Udp(address) => {
-            let mut addresses = address.to_socket_addrs().map_err(configured(file))?;
-            let centre = addresses
-                .next()
+            let unknown = |error| configured(file)(format!("centre is {address}: {error}"));
+            let addresses: Vec<_> = address.to_socket_addrs().map_err(unknown)?.collect();
+            let centre = *addresses
+                .first()
                 .ok_or_else(|| configured(file)("centre: no address of that name"))?;
-            let mut socket = Udp::bind(if centre.is_ipv6() { "[::]:0" } else { "0.0.0.0:0" })?;
+            let mut socket = Towards::open(addresses)?;
             run_sensor(&mut socket, &centre, &mut link, &mut program)?;
         }
         #[cfg(feature = "mqtt")]
