@@ -312,7 +312,8 @@ fn all_faults_are_named_at_once_and_no_key_is_shown() {
     let group =
         good.replace("number = 2", "numbers = \"2-9\"")
             .replacen(&format!("key = \"{}\"", key('b')), "loss = 2", 1);
-    let (_, said) = checked(&group.replacen("report = { kind = \"sign\" }\nloss = 0.1", "report = \"bit\"", 1));
+    let group = group.replacen("report = { kind = \"sign\" }\nloss = 0.1", "report = \"bit\"", 1);
+    let (_, said) = checked(&group);
     assert_eq!((said.matches("loss is 2").count(), said.matches("fleet_key_file").count()), (1, 1), "{said}");
     let (_, said) = checked(&group.replace("2-9", "2-200000"));
     assert!(said.contains("at most 100000 numbers in a range"), "{said}");
