@@ -15,12 +15,15 @@ use fewbits_monte_carlo::Stream;
 use fewbits_protocol::{Feedback, Note, SensorSettings, Slot};
 use nalgebra::Vector1;
 use serde::Deserialize;
-use std::io::BufRead;
+use std::io::{BufRead, Read};
 use std::net::ToSocketAddrs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::time::Duration;
+
+/// Longest line of a sample, in bytes.
+const MAX_LINE: u64 = 1 << 16;
 
 /// Content of `sensor.toml`.
 #[derive(Deserialize)]
@@ -114,6 +117,7 @@ pub(crate) fn run(options: &SensorOptions) -> Result<Ending, Error> {
         node,
         stream: Stream::new(given.seed).indexed(u64::from(given.number)),
         refused: None,
+        bad: 0,
         centre: crate::place::shown(&given.centre),
         notes: Limiter::default(),
     };
@@ -146,6 +150,10 @@ pub(crate) fn run(options: &SensorOptions) -> Result<Ending, Error> {
     }
     match program.refused {
         Some(error) => Err(error),
+        None if program.bad > 0 => {
+            say!("{} lines were no finite numbers: missing measurements", program.bad);
+            Ok(Ending::Failed)
+        }
         None => Ok(Ending::Good),
     }
 }
@@ -167,8 +175,13 @@ fn node(file: &Path, given: &Configuration) -> Result<Node, Error> {
 fn lines() -> Receiver<(u64, std::io::Result<String>)> {
     let (sender, receiver) = sync_channel(1024);
     std::thread::spawn(move || {
-        for (number, line) in (1..).zip(std::io::stdin().lock().lines()) {
-            if sender.send((number, line)).is_err() {
+        let mut input = std::io::stdin().lock();
+        for number in 1.. {
+            let mut line = Vec::new();
+            let read = (&mut input).take(MAX_LINE).read_until(b'\n', &mut line);
+            let is_over = !matches!(read, Ok(1..));
+            let line = read.map(|_| String::from_utf8_lossy(&line).into_owned());
+            if is_over && line.is_ok() || sender.send((number, line)).is_err() || is_over {
                 return;
             }
         }
@@ -181,6 +194,8 @@ struct Samples {
     node: Node,
     stream: Stream,
     refused: Option<Error>,
+    /// Number of lines that were no numbers.
+    bad: u64,
     /// Where the centre is, without a password.
     centre: String,
     notes: Limiter,
@@ -194,7 +209,7 @@ impl Samples {
 }
 
 impl Program for Samples {
-    /// Takes one line per slot. An empty line, or a line that has not come yet, is a missing measurement: silence.
+    /// Takes one line per slot. An empty line, NaN, a line that has not come yet, or one that is no number is a missing measurement: silence.
     fn sample(&mut self, slot: Slot, feedback: &BitString) -> ControlFlow<(), Option<BitString>> {
         let (number, line) = match self.lines.try_recv() {
             Ok((number, Ok(line))) => (number, line),
@@ -205,11 +220,16 @@ impl Program for Samples {
         let cell = line.trim();
         let sample = match cell.parse::<f64>() {
             Ok(sample) if sample.is_finite() => sample,
+            Ok(sample) if sample.is_nan() => return ControlFlow::Continue(None),
             // The first line may be a name.
             Err(_) if cell.is_empty() || number == 1 => return ControlFlow::Continue(None),
+            // A sensor goes on behind a garbled line.
             _ => {
-                let problem = format!("line {number}: `{cell}` is no finite number");
-                return self.refuse(Error::content("standard input", problem));
+                self.bad += 1;
+                let shown: String = cell.chars().take(40).collect();
+                self.notes
+                    .say("line", &format!("line {number}: `{shown}` is no finite number: a missing measurement"));
+                return ControlFlow::Continue(None);
             }
         };
         let mut rng = self.stream.indexed(u64::from(slot.number())).rng();

@@ -447,6 +447,23 @@ fn fleet_begins_with_one_command() {
     assert!(summary["envelopes"]["unknown"].as_u64().unwrap() > 0, "{said:?}");
 }
 
+/// A garbled line is a missing measurement: the sensor goes on, names it, and its exit code shows it.
+#[test]
+fn a_sensor_goes_on_behind_garbled_lines() {
+    let folder = tempfile::tempdir().unwrap();
+    written(folder.path(), &free_place(), &key('b'));
+    let mut centre = Running::new(start(folder.path(), &["centre", "centre.toml", "--slots", MOST_SLOTS]));
+    let mut sensor = Running::new(start(folder.path(), &["sensor", "sensor1.toml"]));
+    let samples = b"value\n5.0\n5..2\n\xff\xfe\nNaN\n\ninf\n5.1\n5.2\n";
+    sensor.stdin.take().unwrap().write_all(samples).unwrap();
+    let output = sensor.output();
+    centre.kill().unwrap();
+    centre.wait().unwrap();
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("line 3: `5..2` is no finite number") && said.contains("3 lines were no"), "{said}");
+}
+
 #[test]
 fn second_centre_on_one_state_is_refused_and_nothing_else_is_silent() {
     let folder = tempfile::tempdir().unwrap();
