@@ -48,6 +48,7 @@ mod serial;
 mod stretches;
 mod table_options;
 mod target;
+mod towards;
 mod track;
 mod unpack;
 mod verify;

@@ -34,7 +34,7 @@ pub(crate) enum Place<'a> {
 impl<'a> Place<'a> {
     pub(crate) fn of(text: &'a str) -> Result<Self, String> {
         let Some((kind, rest)) = text.split_once("://") else {
-            return Ok(Self::Udp(text));
+            return host_and_port(text).map(Self::Udp);
         };
         match (kind, rest.split_once('/')) {
             #[cfg(feature = "mqtt")]
@@ -69,6 +69,25 @@ impl<'a> Place<'a> {
                 Err(format!("{}: expected {expected}", shown(text)))
             }
         }
+    }
+}
+
+/// # Errors
+/// If the text is no host with a port. Whether the host exists is not looked up.
+fn host_and_port(text: &str) -> Result<&str, String> {
+    let is_host = |host: &str| match host.strip_prefix('[') {
+        Some(rest) => rest
+            .strip_suffix(']')
+            .is_some_and(|ip| ip.parse::<std::net::Ipv6Addr>().is_ok()),
+        None => !host.is_empty() && !host.contains([':', '/', '@']) && !host.contains(char::is_whitespace),
+    };
+    let parts = text.rsplit_once(':');
+    match parts.is_some_and(|(host, port)| is_host(host) && port.parse::<u16>().is_ok()) {
+        true => Ok(text),
+        false => Err(format!(
+            "`{}`: expected host:port, an IPv6 address in brackets, the port at most 65535",
+            shown(text)
+        )),
     }
 }
 

@@ -8,18 +8,22 @@ use crate::place::Place;
 use crate::private::{configuration, configured};
 use crate::report::Report;
 use crate::say::say;
+use crate::towards::Towards;
 use fewbits_core::{BitString, SensorNode};
-use fewbits_link::{Key, Program, SensorLink, Store, Udp, run_sensor};
+use fewbits_link::{Key, Program, SensorLink, Store, run_sensor};
 use fewbits_monte_carlo::Stream;
 use fewbits_protocol::{Feedback, Note, SensorSettings, Slot};
 use nalgebra::Vector1;
 use serde::Deserialize;
-use std::io::BufRead;
+use std::io::{BufRead, Read};
 use std::net::ToSocketAddrs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::time::Duration;
+
+/// Longest line of a sample, in bytes.
+const MAX_LINE: u64 = 1 << 16;
 
 /// Content of `sensor.toml`.
 #[derive(Deserialize)]
@@ -53,17 +57,50 @@ fn one() -> usize {
     1
 }
 
+/// What `sensor.toml` says, and its parts.
+struct Given {
+    configuration: Configuration,
+    node: Node,
+    key: Key,
+}
+
+/// Reads a file and names its first fault.
+fn read(file: &Path) -> Result<Given, Error> {
+    let configuration: Configuration = configuration(file)?;
+    let node = node(file, &configuration)?;
+    let key = Key::from_hex(&configuration.key).map_err(configured(file))?;
+    if !(configuration.deviation.is_finite() && configuration.deviation > 0.0) {
+        return Err(configured(file)(format!("deviation is {}: expected above 0", configuration.deviation)));
+    }
+    if let Place::Udp(address) = Place::of(&configuration.centre).map_err(configured(file))?
+        && address.ends_with(":0")
+    {
+        return Err(configured(file)(format!("centre is {address}: expected the port at which the centre listens")));
+    }
+    Ok(Given {
+        configuration,
+        node,
+        key,
+    })
+}
+
+/// Runs `check` for a sensor.
+pub(crate) fn check(file: &Path) -> Result<Ending, Error> {
+    let number = read(file)?.configuration.number;
+    crate::output::print(&format!("{}: no fault; sensor {number}\n", file.display()))?;
+    Ok(Ending::Good)
+}
+
 /// Runs the task until the samples end.
 pub(crate) fn run(options: &SensorOptions) -> Result<Ending, Error> {
     let file = &options.configuration;
-    let given: Configuration = configuration(file)?;
-    let node = node(file, &given)?;
+    let Given {
+        configuration: given,
+        node,
+        key,
+    } = read(file)?;
     let mut settings = SensorSettings::new(Feedback::Told);
     settings.heartbeat_after = given.heartbeat_after;
-    let key = Key::from_hex(&given.key).map_err(configured(file))?;
-    if !(given.deviation.is_finite() && given.deviation > 0.0) {
-        return Err(configured(file)(format!("deviation is {}: expected above 0", given.deviation)));
-    }
     if given.state.is_none() {
         say!(
             "note: no `state`: when this sensor starts again, its centre refuses it until it has a new key, and it accepts old \
@@ -80,16 +117,18 @@ pub(crate) fn run(options: &SensorOptions) -> Result<Ending, Error> {
         node,
         stream: Stream::new(given.seed).indexed(u64::from(given.number)),
         refused: None,
+        bad: 0,
         centre: crate::place::shown(&given.centre),
         notes: Limiter::default(),
     };
     match Place::of(&given.centre).map_err(configured(file))? {
         Place::Udp(address) => {
-            let mut addresses = address.to_socket_addrs().map_err(configured(file))?;
-            let centre = addresses
-                .next()
+            let unknown = |error| configured(file)(format!("centre is {address}: {error}"));
+            let addresses: Vec<_> = address.to_socket_addrs().map_err(unknown)?.collect();
+            let centre = *addresses
+                .first()
                 .ok_or_else(|| configured(file)("centre: no address of that name"))?;
-            let mut socket = Udp::bind(if centre.is_ipv6() { "[::]:0" } else { "0.0.0.0:0" })?;
+            let mut socket = Towards::open(addresses)?;
             run_sensor(&mut socket, &centre, &mut link, &mut program)?;
         }
         #[cfg(feature = "mqtt")]
@@ -111,6 +150,10 @@ pub(crate) fn run(options: &SensorOptions) -> Result<Ending, Error> {
     }
     match program.refused {
         Some(error) => Err(error),
+        None if program.bad > 0 => {
+            say!("{} lines were no finite numbers: missing measurements", program.bad);
+            Ok(Ending::Failed)
+        }
         None => Ok(Ending::Good),
     }
 }
@@ -132,8 +175,13 @@ fn node(file: &Path, given: &Configuration) -> Result<Node, Error> {
 fn lines() -> Receiver<(u64, std::io::Result<String>)> {
     let (sender, receiver) = sync_channel(1024);
     std::thread::spawn(move || {
-        for (number, line) in (1..).zip(std::io::stdin().lock().lines()) {
-            if sender.send((number, line)).is_err() {
+        let mut input = std::io::stdin().lock();
+        for number in 1.. {
+            let mut line = Vec::new();
+            let read = (&mut input).take(MAX_LINE).read_until(b'\n', &mut line);
+            let is_over = !matches!(read, Ok(1..));
+            let line = read.map(|_| String::from_utf8_lossy(&line).into_owned());
+            if is_over && line.is_ok() || sender.send((number, line)).is_err() || is_over {
                 return;
             }
         }
@@ -146,6 +194,8 @@ struct Samples {
     node: Node,
     stream: Stream,
     refused: Option<Error>,
+    /// Number of lines that were no numbers.
+    bad: u64,
     /// Where the centre is, without a password.
     centre: String,
     notes: Limiter,
@@ -159,7 +209,7 @@ impl Samples {
 }
 
 impl Program for Samples {
-    /// Takes one line per slot. An empty line, or a line that has not come yet, is a missing measurement: silence.
+    /// Takes one line per slot. An empty line, NaN, a line that has not come yet, or one that is no number is a missing measurement: silence.
     fn sample(&mut self, slot: Slot, feedback: &BitString) -> ControlFlow<(), Option<BitString>> {
         let (number, line) = match self.lines.try_recv() {
             Ok((number, Ok(line))) => (number, line),
@@ -170,11 +220,16 @@ impl Program for Samples {
         let cell = line.trim();
         let sample = match cell.parse::<f64>() {
             Ok(sample) if sample.is_finite() => sample,
+            Ok(sample) if sample.is_nan() => return ControlFlow::Continue(None),
             // The first line may be a name.
             Err(_) if cell.is_empty() || number == 1 => return ControlFlow::Continue(None),
+            // A sensor goes on behind a garbled line.
             _ => {
-                let problem = format!("line {number}: `{cell}` is no finite number");
-                return self.refuse(Error::content("standard input", problem));
+                self.bad += 1;
+                let shown: String = cell.chars().take(40).collect();
+                self.notes
+                    .say("line", &format!("line {number}: `{shown}` is no finite number: a missing measurement"));
+                return ControlFlow::Continue(None);
             }
         };
         let mut rng = self.stream.indexed(u64::from(slot.number())).rng();

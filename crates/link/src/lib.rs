@@ -35,11 +35,13 @@
 //! Not here: radio and energy (`fewbits-network`), estimators.
 
 mod base64;
+mod disk;
 pub mod doors;
 mod envelope;
 mod error;
 mod fleet;
 mod fusion;
+mod hello;
 mod http;
 mod live;
 #[cfg(feature = "mqtt")]

@@ -120,7 +120,13 @@ impl SensorLink {
         self.counts
     }
 
-    /// A heartbeat that tells the centre the sensor's address. Send it repeatedly until a frame of the centre has come.
+    /// Whether the centre asks this sensor. One that reports by the clock may never hear anything.
+    pub(crate) fn is_asked(&self) -> bool {
+        self.sensor.settings().feedback == Feedback::Told
+    }
+
+    /// A heartbeat that tells the centre the sensor's address. Send it repeatedly until a frame of the centre has come. A centre whose slot
+    /// has begun answers it at once.
     ///
     /// # Errors
     /// If the store cannot be written.

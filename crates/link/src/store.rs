@@ -1,10 +1,11 @@
 //! A file that is always complete: a new version is written beside the old one and then replaces it.
 
+use crate::disk::{Disk, Files};
 use crate::error::Error;
 use crate::private::{created, require_private};
 use serde::{Serialize, de::DeserializeOwned};
 use std::fs::{File, TryLockError};
-use std::io::{ErrorKind, Write};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -100,29 +101,36 @@ impl Store {
     /// If a file cannot be written. The old content is then unchanged.
     pub fn save(&self, value: &impl Serialize) -> Result<(), Error> {
         let beside = self.beside(&format!(".new.{}", std::process::id()));
+        let bytes = serde_json::to_vec(value).map_err(|error| Error::File {
+            path: self.path.clone(),
+            source: error.into(),
+        })?;
+        self.replace(&Files, &beside, &bytes)
+            .map_err(|(path, source)| Error::File { path, source })
+    }
+
+    /// Writes the next version beside the file and renames it; says which path failed.
+    fn replace<D: Disk>(&self, disk: &D, beside: &Path, bytes: &[u8]) -> Result<(), (PathBuf, std::io::Error)> {
         let failed = |path: &Path| {
             let path = path.to_owned();
-            move |source| Error::File { path, source }
+            move |source| (path, source)
         };
-        let bytes = serde_json::to_vec(value).map_err(|error| failed(&self.path)(error.into()))?;
         // A file of that name is left from a process of the same number: it may have other rights.
-        match std::fs::remove_file(&beside) {
-            Err(error) if error.kind() != ErrorKind::NotFound => return Err(failed(&beside)(error)),
+        match disk.remove(beside) {
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(failed(beside)(error)),
             _ => {}
         }
-        let mut file = created().create_new(true).open(&beside).map_err(failed(&beside))?;
-        file.write_all(&bytes).map_err(failed(&beside))?;
+        let mut file = disk.create(beside).map_err(failed(beside))?;
+        disk.write(&mut file, bytes).map_err(failed(beside))?;
         if self.durable {
-            file.sync_all().map_err(failed(&beside))?;
+            disk.sync(&file).map_err(failed(beside))?;
         }
         drop(file);
-        std::fs::rename(&beside, &self.path).map_err(failed(&self.path))?;
+        disk.rename(beside, &self.path).map_err(failed(&self.path))?;
         // The new name is safe once the folder is.
-        if self.durable && cfg!(unix) {
+        if self.durable {
             let folder = self.folder();
-            File::open(folder)
-                .and_then(|folder| folder.sync_all())
-                .map_err(failed(folder))?;
+            disk.sync_folder(folder).map_err(failed(folder))?;
         }
         Ok(())
     }
@@ -147,5 +155,54 @@ impl Store {
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
             Err(source) => Err(Error::File { path, source }),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::disk::model::Model;
+
+    /// What may be in the file after a power failure at any moment while `new` replaces `old`, and after that.
+    fn after_failures(store: &Store, fails: Option<usize>) -> (Vec<Vec<u8>>, Vec<Vec<u8>>, bool) {
+        let disk = Model::with(store.path(), b"old version");
+        disk.fail_at(fails);
+        let outcome = store.replace(&disk, Path::new("folder/state.new.1"), b"new version");
+        (disk.seen(), disk.possible(store.path()), outcome.is_ok())
+    }
+
+    #[test]
+    fn a_durable_state_survives_a_power_failure_at_any_moment() {
+        let whole = |content: &Vec<u8>| content == b"old version" || content == b"new version";
+        let durable = Store::new("folder/state").durable();
+        let (during, after, is_good) = after_failures(&durable, None);
+        assert!(is_good && during.iter().all(whole), "{during:?}");
+        // Both the file and its folder are on the disk when the call returns.
+        assert_eq!(after, [b"new version".to_vec()]);
+        // Each call may fail. What is there then is whole, and the error is returned.
+        for fails in 0..6 {
+            let (during, after, is_good) = after_failures(&durable, Some(fails));
+            assert!(during.iter().chain(&after).all(whole), "call {fails}: {during:?}, {after:?}");
+            // That there is nothing to remove is no error.
+            assert_eq!(is_good, fails == 0, "call {fails}");
+        }
+        // Without waiting for the disk the name may be there before the content: the test would see it.
+        let (during, after, _) = after_failures(&Store::new("folder/state"), None);
+        assert!(during.iter().any(|content| content.is_empty()) && after.len() > 1);
+    }
+
+    #[test]
+    fn what_the_real_disk_does_is_what_the_model_does() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::new(folder.path().join("state")).durable();
+        for value in 0..3_u32 {
+            store.save(&value).unwrap();
+            assert_eq!(store.load::<u32>().unwrap(), Some(value));
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        // A folder that cannot be synchronised is an error.
+        let gone = Store::new(folder.path().join("gone/state")).durable();
+        assert!(matches!(gone.save(&1_u32), Err(Error::File { .. })));
     }
 }

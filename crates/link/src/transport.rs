@@ -1,6 +1,7 @@
 //! The trait of transports, and the loops that run a station or a sensor over a transport by the clock of the machine.
 
 use crate::error::Error;
+use crate::hello::Hellos;
 use crate::sensor::{Request, SensorLink};
 use crate::station::{Output, Station};
 use fewbits_core::BitString;
@@ -21,10 +22,8 @@ const BURST: usize = 64;
 const BURST_PAUSE: u64 = 1_000_000;
 /// Longest wait: the caller is asked ten times a second whether to continue.
 const MAX_WAIT: Duration = Duration::from_millis(100);
-const HELLO_EVERY: Duration = Duration::from_secs(1);
-/// Without a frame of the centre for so long, and for each further minute, the program of a sensor is told.
-const UNANSWERED_AFTER: Duration = Duration::from_secs(10);
-const UNANSWERED_EVERY: Duration = Duration::from_secs(60);
+/// Before a program hears that its clock was never set again.
+const UNSET_EVERY: Duration = Duration::from_secs(60);
 /// The beginning of 2020 in nanoseconds since 1970. A clock before it was never set.
 const EARLIEST: u64 = 1_577_836_800_000_000_000;
 
@@ -44,6 +43,9 @@ pub trait Transport {
     /// # Errors
     /// If the transport can receive no more.
     fn receive(&mut self, wait: Duration) -> Result<Option<Datagram<'_, Self::Address>>, Error>;
+
+    /// The datagram that was received last was authentic: it came from the other end.
+    fn accepted(&mut self) {}
 
     /// Number of datagrams that arrived and were dropped because too many waited.
     fn dropped(&self) -> u64 {
@@ -99,7 +101,7 @@ pub fn run_station<R: Receiver, T: Transport>(
         let is_set = now() >= EARLIEST;
         if is_set {
             station.on_time(now(), &mut outputs)?;
-        } else if said_unset.is_none_or(|said| said.elapsed() >= UNANSWERED_EVERY) {
+        } else if said_unset.is_none_or(|said| said.elapsed() >= UNSET_EVERY) {
             said_unset = Some(Instant::now());
             let wait = EARLIEST - now();
             outputs.push(Output::ClockBehind { wait });
@@ -146,7 +148,8 @@ pub trait Program {
     /// The state could not be stored, and nothing was sent because of that. It is tried again with the next frame.
     fn trouble(&mut self, _: &Error) {}
 
-    /// No frame of the centre was accepted for this time. Called after ten seconds, and each minute from then on.
+    /// No frame of the centre was accepted for this time, and at least three heartbeats were not answered. Called after ten seconds, and
+    /// each minute from then on.
     fn unanswered(&mut self, _: Duration, _: &SensorLink) {}
 
     /// Whether to continue. Called at least ten times a second.
@@ -167,13 +170,10 @@ pub fn run_sensor<T: Transport>(
     program: &mut impl Program,
 ) -> Result<(), Error> {
     let mut requests = Vec::new();
-    // By a clock that is never set back.
-    let mut hello_at = Instant::now();
-    let (mut answered_at, mut say_at, mut taken) = (Instant::now(), UNANSWERED_AFTER, link.counts().taken);
+    let (mut hellos, mut taken) = (Hellos::new(Instant::now()), link.counts().taken);
     while program.goes_on() {
-        if Instant::now() >= hello_at {
+        if hellos.is_due(Instant::now()) {
             requests.extend(tolerate(link.hello(), program)?);
-            hello_at = Instant::now() + HELLO_EVERY;
         }
         let outcome = link.on_time(now(), &mut requests);
         tolerate(outcome, program)?;
@@ -183,18 +183,17 @@ pub fn run_sensor<T: Transport>(
                     Request::Datagram(bytes) => transport.send(centre, &bytes),
                     Request::Note(note) => program.note(note),
                     Request::Sample { slot, feedback } => {
+                        hellos.on_question(Instant::now());
                         let ControlFlow::Continue(report) = program.sample(slot, &feedback) else {
                             return Ok(());
                         };
                         let outcome = link.on_sample(now(), report.as_ref(), &mut requests);
                         tolerate(outcome, program)?;
-                        // While the centre asks, it knows the sensor's address: no heartbeat is needed.
-                        hello_at = Instant::now() + HELLO_EVERY;
                     }
                 }
             }
         }
-        let hello = u64::try_from(hello_at.saturating_duration_since(Instant::now()).as_nanos()).unwrap_or(u64::MAX);
+        let hello = u64::try_from(hellos.wait(Instant::now()).as_nanos()).unwrap_or(u64::MAX);
         let until = link.next_timer().unwrap_or(u64::MAX).min(now().saturating_add(hello));
         // One datagram at a time: a second question that waits would replace the slot of the sample that the first one asks for, and the
         // report would be sent as that of the wrong slot.
@@ -203,10 +202,13 @@ pub fn run_sensor<T: Transport>(
             tolerate(outcome, program).map(drop)
         })?;
         if link.counts().taken != taken {
-            (answered_at, say_at, taken) = (Instant::now(), UNANSWERED_AFTER, link.counts().taken);
-        } else if answered_at.elapsed() >= say_at {
-            program.unanswered(answered_at.elapsed(), link);
-            say_at += UNANSWERED_EVERY;
+            taken = link.counts().taken;
+            transport.accepted();
+            hellos.on_answer(Instant::now());
+        } else if link.is_asked()
+            && let Some(since) = hellos.unanswered(Instant::now())
+        {
+            program.unanswered(since, link);
         }
     }
     Ok(())

@@ -28,6 +28,11 @@ pub struct CentreSettings {
     pub schedule: Schedule,
     /// Nanoseconds from the beginning of a slot to its deadline. Reports that arrive later are not used.
     pub deadline: u64,
+    /// A slot whose timer fires more nanoseconds after its beginning does not begin: its sensors would have no time to answer, and their
+    /// silence would be taken for an observation. [`CentreSettings::new`] says half the time to the deadline, and a tenth of it if a sensor
+    /// reports by the clock.
+    #[serde(default = "any_time")]
+    pub latest_start: u64,
     /// What the check of a frame covers.
     pub check: Check,
     /// Whether the centre acknowledges reports by frames. Not needed on a link that acknowledges by itself.
@@ -40,15 +45,23 @@ pub struct CentreSettings {
 impl CentreSettings {
     /// Settings with the deadline at nine tenths of a slot, a check of the whole frame, no acknowledgements and no heartbeats.
     pub fn new(members: Vec<Member>, schedule: Schedule) -> Self {
+        let deadline = schedule.period() / 10 * 9;
+        let by_clock = members.iter().any(|member| member.feedback == Feedback::Clock);
         Self {
             members,
             schedule,
-            deadline: schedule.period() / 10 * 9,
+            deadline,
+            latest_start: deadline / if by_clock { 10 } else { 2 },
             check: Check::Whole,
             acknowledges: false,
             announce_every: 0,
         }
     }
+}
+
+/// As in settings that were stored without a latest start.
+fn any_time() -> u64 {
+    u64::MAX
 }
 
 /// Timers of a centre.
@@ -118,7 +131,7 @@ pub enum Action {
 /// on_timer(deadline) -> Update
 /// ```
 /// A report of another slot is late. A report with another digest answers other feedback than was sent and is no observation. A second
-/// report is a duplicate. If the driver missed slots, they are skipped: their sensors were not asked.
+/// report is a duplicate. If the driver missed slots, or is too late for one, they are skipped: their sensors were not asked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Centre {
     settings: CentreSettings,
@@ -213,6 +226,10 @@ impl Centre {
         });
         // The clock was set back, or the slot is the one in which the program was stopped: no slot begins twice.
         if count <= self.slot {
+            return;
+        }
+        // Too late for answers: the program was started within the slot, or was held up.
+        if now.saturating_sub(schedule.start(count)) > self.settings.latest_start {
             return;
         }
         self.slot = count;

@@ -298,6 +298,11 @@ fn numbers(entry: &Entry) -> Result<Vec<u32>, String> {
         let (first, last) = part.split_once('-').unwrap_or((part, part));
         match (first.trim().parse::<u32>(), last.trim().parse::<u32>()) {
             (Ok(first), Ok(last)) if first <= last && last - first < MAX_GROUP => all.extend(first..=last),
+            (Ok(first), Ok(last)) if first <= last => {
+                return Err(format!(
+                    "numbers is `{text}`: expected at most {MAX_GROUP} numbers in a range; give several"
+                ));
+            }
             _ => return Err(format!("numbers is `{text}`: expected numbers and ranges as `1-40,50`")),
         }
     }

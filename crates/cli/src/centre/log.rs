@@ -2,7 +2,7 @@
 
 use crate::Ending;
 use crate::error::Error;
-use crate::notes::Limiter;
+use crate::notes::{Limiter, MOST_NAMED};
 use crate::say::say;
 use fewbits_core::Observation;
 use fewbits_link::{Counts, Output, Station};
@@ -30,6 +30,18 @@ pub(super) struct Log {
     /// Numbers of the sensors that reported.
     heard: BTreeSet<u32>,
     silence_said: bool,
+}
+
+/// Says how many frames with the numbers of sensors were refused: of each sensor, or in one line if there are many.
+fn refused(mut of: Vec<(u32, u64)>, what: &str) {
+    of.retain(|(_, more)| *more > 0);
+    if of.len() <= MOST_NAMED {
+        of.iter()
+            .for_each(|(number, more)| say!("sensor {number}: {more} frames {what} were refused"));
+    } else if let Some((number, most)) = of.iter().max_by_key(|(_, more)| *more) {
+        let (sensors, all) = (of.len(), of.iter().map(|(_, more)| more).sum::<u64>());
+        say!("{all} frames {what} with the numbers of {sensors} sensors were refused, {most} of sensor {number}");
+    }
 }
 
 impl Log {
@@ -68,12 +80,14 @@ impl Log {
                     self.notes.say("trouble", &format!("slot {}: {trouble}", step.slot));
                 }
                 for event in &step.events {
-                    let text = match event.sensor().map(|sensor| self.number(sensor)) {
-                        Some(number) => format!("slot {}: sensor {number} {}", step.slot, event.name()),
-                        None => format!("slot {}: {}", step.slot, event.name()),
-                    };
-                    let kind = format!("{} {:?}", event.name(), event.sensor());
-                    self.notes.say(&kind, &text);
+                    let (slot, name) = (step.slot, event.name());
+                    match event.sensor().map(|sensor| self.number(sensor)) {
+                        Some(number) => {
+                            self.notes
+                                .say_of(name, number, &format!("slot {slot}: sensor {number} {name}"));
+                        }
+                        None => self.notes.say(name, &format!("slot {slot}: {name}")),
+                    }
                 }
                 if self.slots == SILENT_SLOTS && self.reports == 0 {
                     self.silence_said = true;
@@ -103,8 +117,8 @@ impl Log {
             } => {}
             Output::Note { sensor, note } => {
                 let (number, text) = (self.number(*sensor), note.to_string());
-                let kind = format!("{number} {}", text.split(',').next().unwrap_or_default());
-                self.notes.say(&kind, &format!("sensor {number}: {text}"));
+                let kind = text.split(',').next().unwrap_or_default();
+                self.notes.say_of(kind, number, &format!("sensor {number}: {text}"));
             }
             _ => {}
         }
@@ -126,18 +140,15 @@ impl Log {
             } else {
                 EVERY
             };
-        for sensor in 0..self.numbers.len() {
-            let (counts, number) = (station.counts_of(sensor), self.number(sensor));
+        let (mut forged, mut replayed) = (Vec::new(), Vec::new());
+        for (sensor, number) in self.numbers.iter().enumerate() {
+            let counts = station.counts_of(sensor);
             let before = std::mem::replace(&mut self.of_sensors[sensor], counts);
-            for (more, what) in [
-                (counts.forged - before.forged, "under another key"),
-                (counts.replayed - before.replayed, "that were used before"),
-            ] {
-                if more > 0 {
-                    say!("sensor {number}: {more} frames {what} were refused");
-                }
-            }
+            forged.push((*number, counts.forged - before.forged));
+            replayed.push((*number, counts.replayed - before.replayed));
         }
+        refused(forged, "under another key");
+        refused(replayed, "that were used before");
         let before = std::mem::replace(&mut self.all, all);
         for (more, what) in [
             (all.unknown - before.unknown, "of unknown or revoked sensors"),

@@ -70,8 +70,12 @@ pub(crate) fn run(options: &CentreOptions) -> Result<Ending, Error> {
     }
 }
 
-/// Runs `check`: names all faults of a configuration without using it.
+/// Runs `check`: names all faults of a configuration of a centre or a sensor without using it.
 pub(crate) fn check(file: &Path) -> Result<Ending, Error> {
+    let table = crate::private::table(file)?;
+    if table.contains_key("centre") && !table.contains_key("listen") {
+        return crate::sensor::check(file);
+    }
     let given = Configuration::read(file)?;
     let options = CentreOptions::of(file);
     // Only addresses over UDP are texts with a form.

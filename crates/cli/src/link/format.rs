@@ -3,10 +3,10 @@
 /// Format of messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Format {
-    /// Uplinks of ChirpStack or The Things Stack as JSON, one per line, with payloads in Cayenne LPP; with `--sensor` payloads are frames.
+    /// Uplinks of ChirpStack or The Things Stack as JSON, one behind the other, with payloads in Cayenne LPP; with `--sensor` payloads are frames.
     Lorawan,
-    /// Lists of SenML (RFC 8428) in JSON, one per line.
+    /// Lists of SenML (RFC 8428) in JSON, one behind the other.
     Senml,
-    /// One list of SenML in CBOR.
+    /// Lists of SenML in CBOR, one behind the other.
     SenmlCbor,
 }

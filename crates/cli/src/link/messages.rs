@@ -2,6 +2,7 @@
 //! reads.
 
 use super::format::Format;
+use super::split::{MAX_MESSAGE, Messages};
 use crate::Ending;
 use crate::arguments::ReceiveOptions;
 use crate::error::Error;
@@ -9,11 +10,8 @@ use crate::notes::Limiter;
 use crate::output::{Cell, Shape, Sheet};
 use crate::{node, recording};
 use fewbits_link::doors::{cayenne, lorawan, senml};
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufReader, Read};
 use std::time::{SystemTime, UNIX_EPOCH};
-
-/// Longest message that is read, in bytes.
-const MAX_MESSAGE: u64 = 1 << 24;
 
 /// Messages, one after the other.
 type Source = Box<dyn FnMut() -> std::io::Result<Option<Vec<u8>>>>;
@@ -95,28 +93,26 @@ fn source(options: &ReceiveOptions, format: Format) -> Result<(Source, String), 
     let (stream, name) = recording::stream(&options.file)?;
     let name = name.to_owned();
     if format == Format::SenmlCbor {
+        let mut rest = None::<Vec<u8>>;
         let mut stream = Some(stream);
-        let all = move || {
-            let Some(stream) = stream.take() else { return Ok(None) };
-            let mut bytes = Vec::new();
-            stream.take(MAX_MESSAGE).read_to_end(&mut bytes)?;
-            Ok(Some(bytes))
+        let next = move || {
+            if let Some(stream) = stream.take() {
+                let mut bytes = Vec::new();
+                stream.take(MAX_MESSAGE).read_to_end(&mut bytes)?;
+                rest = Some(bytes);
+            }
+            // What is no list has no end that could be known: it is the last message.
+            let all = rest.take().filter(|bytes| !bytes.is_empty());
+            Ok(all.map(|mut bytes| {
+                let end = senml::cbor_length(&bytes).unwrap_or(bytes.len());
+                rest = Some(bytes.split_off(end));
+                bytes
+            }))
         };
-        return Ok((Box::new(all), name));
+        return Ok((Box::new(next), name));
     }
-    let mut lines = BufReader::new(stream);
-    let next = move || {
-        loop {
-            let mut line = Vec::new();
-            let count = (&mut lines).take(MAX_MESSAGE).read_until(b'\n', &mut line)?;
-            if count == 0 {
-                return Ok(None);
-            }
-            if !line.trim_ascii().is_empty() {
-                return Ok(Some(line));
-            }
-        }
-    };
+    let mut messages = Messages::new(BufReader::new(stream));
+    let next = move || messages.next();
     Ok((Box::new(next), name))
 }
 
@@ -156,6 +152,7 @@ fn of_uplink(message: &[u8], is_of: &impl Fn(&str) -> bool) -> Result<Vec<Row>, 
     for reading in cayenne::readings(&up.payload)? {
         let parts: &[&str] = match (reading.kind, reading.values.len()) {
             ("gps", _) => &["/latitude", "/longitude", "/altitude"],
+            ("colour", _) => &["/red", "/green", "/blue"],
             (_, 3) => &["/x", "/y", "/z"],
             _ => &[""],
         };

@@ -3,4 +3,5 @@
 pub(crate) mod format;
 mod messages;
 pub(crate) mod receive;
+mod split;
 mod tables;

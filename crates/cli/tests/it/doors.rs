@@ -76,6 +76,41 @@ fn senml_is_rows() {
     assert_eq!(found.lines().nth(1), Some("1276020076,urn:dev:a:x,1.5,Cel"));
 }
 
+/// Lists and messages over several lines, behind a byte order mark, without line ends between, and rows of a centre as they are written.
+#[test]
+fn messages_need_no_line_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let records = |input: &str| {
+        let found = text(&good(folder.path(), &["receive", "--format", "senml"], input.as_bytes()));
+        found.lines().skip(1).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let expected = ["1276020076,urn:dev:a:x,1.5,", "1276020076,urn:dev:a:y,2,"];
+    let one = r#"[{"bn":"urn:dev:a:","bt":1276020076,"n":"x","v":1.5},{"n":"y","v":2}]"#;
+    assert_eq!(records(one), expected);
+    let pretty = one.replace("},{", "},\n{").replace('[', "[\n").replace(']', "\n]\n");
+    assert_eq!(records(&pretty), expected);
+    assert_eq!(records(&pretty.replace('{', "  {\n    ")), expected);
+    assert_eq!(records(&format!("\u{feff}{one}")), expected);
+    assert_eq!(records(&format!("{one}{one}")), [expected, expected].concat());
+    // A list that was cut off costs no other, and shows.
+    let output =
+        fewbits(folder.path(), &["receive", "--format", "senml"], format!("{}\n{one}\n", &one[..60]).as_bytes());
+    assert_eq!(
+        (output.status.code(), text(&output.stdout).lines().count()),
+        (Some(1), 3),
+        "{}",
+        text(&output.stderr)
+    );
+    // [{0: "x", 2: 1.5, 6: 1276020076}], twice, and cut off.
+    let mut cbor = vec![0x81, 0xa3, 0x00, 0x61, b'x', 0x02, 0xf9, 0x3e, 0x00, 0x06, 0x1a];
+    cbor.extend(1_276_020_076_u32.to_be_bytes());
+    let words = ["receive", "--format", "senml-cbor"];
+    let two = [cbor.clone(), cbor.clone()].concat();
+    assert_eq!(text(&good(folder.path(), &words, &two)).lines().count(), 3);
+    let output = fewbits(folder.path(), &words, &two[..two.len() - 3]);
+    assert_eq!((output.status.code(), text(&output.stdout).lines().count()), (Some(1), 2));
+}
+
 /// A centre that is asked to end does so after the step of its slot, which is stored; the next process goes on with the next slot.
 #[test]
 #[ignore = "slots of the wall clock: a busy machine is late by itself; `.ci/kills` runs it"]

@@ -240,6 +240,9 @@ fn configuration_errors_name_file_and_value() {
         ("mean = [0.0]", "mean = [0.0, 1.0]", "expected 1 means"),
         ("kind = \"sign\"", "kind = \"sgin\"", "sgin"),
         (&key('b'), "abcd", "`key` is 2 bytes: expected 32 bytes or more"),
+        ("127.0.0.1:1", "127.0.0.1", "`127.0.0.1`: expected host:port"),
+        ("127.0.0.1:1", "127.0.0.1:99999", "the port at most 65535"),
+        ("127.0.0.1:1", "::1:7070", "an IPv6 address in brackets"),
         ("127.0.0.1:1", "coap://127.0.0.1:1/plant", "coap://127.0.0.1:1/plant: expected host:port"),
         #[cfg(feature = "mqtt")]
         ("127.0.0.1:1", "mqtt://127.0.0.1:1", "expected host:port, mqtt://host:port/fleet"),
@@ -309,8 +312,11 @@ fn all_faults_are_named_at_once_and_no_key_is_shown() {
     let group =
         good.replace("number = 2", "numbers = \"2-9\"")
             .replacen(&format!("key = \"{}\"", key('b')), "loss = 2", 1);
-    let (_, said) = checked(&group.replacen("report = { kind = \"sign\" }\nloss = 0.1", "report = \"bit\"", 1));
+    let group = group.replacen("report = { kind = \"sign\" }\nloss = 0.1", "report = \"bit\"", 1);
+    let (_, said) = checked(&group);
     assert_eq!((said.matches("loss is 2").count(), said.matches("fleet_key_file").count()), (1, 1), "{said}");
+    let (_, said) = checked(&group.replace("2-9", "2-200000"));
+    assert!(said.contains("at most 100000 numbers in a range"), "{said}");
     let (_, said) = checked(&good.replace(&key('b'), &key('a')));
     assert!(said.contains("sensor 2: its key is that of sensor 1"), "{said}");
     // What is no TOML is named by its line, without the line.
@@ -318,6 +324,26 @@ fn all_faults_are_named_at_once_and_no_key_is_shown() {
     assert!(said.contains("line ") && !said.contains(&key('b')), "{said}");
     let (_, said) = checked(&good.replace("127.0.0.1:1", "mqtt://me:secret@127.0.0.1:1"));
     assert!(said.contains("mqtt://127.0.0.1:1") && !said.contains("secret"), "{said}");
+    // A sensor's file is checked as one.
+    let checked = |from: &str, to: &str| {
+        let path = folder.path().join("sensor1.toml");
+        let before = std::fs::read_to_string(&path).unwrap();
+        private(&path, &before.replacen(from, to, 1));
+        let output = fewbits(folder.path(), &["check", "sensor1.toml"], b"");
+        private(&path, &before);
+        (output.status.code(), text(&output.stdout) + &text(&output.stderr))
+    };
+    assert_eq!(checked("number", "number"), (Some(0), "sensor1.toml: no fault; sensor 1\n".to_owned()));
+    for (from, to, said) in [
+        ("127.0.0.1:1", "127.0.0.1:0", "expected the port at which"),
+        ("127.0.0.1:1", "127.0.0.1", "expected host:port"),
+        ("deviation = 0.5", "deviation = -1", "deviation is -1"),
+        ("kind = \"value\"", "kind = \"valeu\"", "valeu"),
+        ("number", "nummer", "nummer"),
+    ] {
+        let (code, found) = checked(from, to);
+        assert!(code == Some(2) && found.contains(said) && !found.contains(&key('a')), "{found}");
+    }
     // Others may not read it.
     use std::os::unix::fs::PermissionsExt;
     std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o644)).unwrap();
@@ -419,6 +445,23 @@ fn fleet_begins_with_one_command() {
     assert!(rows.iter().any(both) && rows.iter().all(|row| row["sensors"][1]["number"] == 3));
     let summary = parsed(said.last().unwrap());
     assert!(summary["envelopes"]["unknown"].as_u64().unwrap() > 0, "{said:?}");
+}
+
+/// A garbled line is a missing measurement: the sensor goes on, names it, and its exit code shows it.
+#[test]
+fn a_sensor_goes_on_behind_garbled_lines() {
+    let folder = tempfile::tempdir().unwrap();
+    written(folder.path(), &free_place(), &key('b'));
+    let mut centre = Running::new(start(folder.path(), &["centre", "centre.toml", "--slots", MOST_SLOTS]));
+    let mut sensor = Running::new(start(folder.path(), &["sensor", "sensor1.toml"]));
+    let samples = b"value\n5.0\n5..2\n\xff\xfe\nNaN\n\ninf\n5.1\n5.2\n";
+    sensor.stdin.take().unwrap().write_all(samples).unwrap();
+    let output = sensor.output();
+    centre.kill().unwrap();
+    centre.wait().unwrap();
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("line 3: `5..2` is no finite number") && said.contains("3 lines were no"), "{said}");
 }
 
 #[test]

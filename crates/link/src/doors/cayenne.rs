@@ -1,23 +1,40 @@
 //! Cayenne's low-power payload (LPP), as many LoRaWAN devices send it: channel, type, and a fixed number of bytes for each reading.
+//!
+//! Beside the types of Cayenne's own description those that devices' libraries added are read, with the sizes and steps of the Arduino
+//! library `CayenneLPP` (types follow from IPSO's objects: 3318, frequency, is 118). A list of positions (240) has no fixed length and is
+//! refused.
 
 use crate::error::Error;
 use fewbits_numerics::error::refuse;
 
 /// Types: number, name, unit, and per value its bytes, whether it is signed, and its step.
-const TYPES: [(u8, &str, &str, usize, &[Part]); 13] = [
+const TYPES: [(u8, &str, &str, usize, &[Part]); 26] = [
     (0, "digital_in", "", 1, &[(1, false, 1.0)]),
     (1, "digital_out", "", 1, &[(1, false, 1.0)]),
     (2, "analog_in", "", 2, &[(2, true, 0.01)]),
     (3, "analog_out", "", 2, &[(2, true, 0.01)]),
+    (100, "generic", "", 4, &[(4, false, 1.0)]),
     (101, "illuminance", "lx", 2, &[(2, false, 1.0)]),
     (102, "presence", "", 1, &[(1, false, 1.0)]),
     (103, "temperature", "°C", 2, &[(2, true, 0.1)]),
     (104, "humidity", "%", 1, &[(1, false, 0.5)]),
     (113, "accelerometer", "g", 6, &[(2, true, 0.001); 3]),
     (115, "barometer", "hPa", 2, &[(2, false, 0.1)]),
-    (128, "frequency", "Hz", 4, &[(4, false, 1.0)]),
+    (116, "voltage", "V", 2, &[(2, false, 0.01)]),
+    (117, "current", "A", 2, &[(2, false, 0.001)]),
+    (118, "frequency", "Hz", 4, &[(4, false, 1.0)]),
+    (120, "percentage", "%", 1, &[(1, false, 1.0)]),
+    (121, "altitude", "m", 2, &[(2, true, 1.0)]),
+    (125, "concentration", "ppm", 2, &[(2, false, 1.0)]),
+    (128, "power", "W", 2, &[(2, false, 1.0)]),
+    (130, "distance", "m", 4, &[(4, false, 0.001)]),
+    (131, "energy", "kWh", 4, &[(4, false, 0.001)]),
+    (132, "direction", "°", 2, &[(2, false, 1.0)]),
+    (133, "time", "s", 4, &[(4, false, 1.0)]),
     (134, "gyrometer", "°/s", 6, &[(2, true, 0.01); 3]),
+    (135, "colour", "", 3, &[(1, false, 1.0); 3]),
     (136, "gps", "", 9, &[(3, true, 1e-4), (3, true, 1e-4), (3, true, 0.01)]),
+    (142, "switch", "", 1, &[(1, false, 1.0)]),
 ];
 
 type Part = (usize, bool, f64);
@@ -31,7 +48,7 @@ pub struct Reading {
     pub kind: &'static str,
     /// Unit; empty if the type has none or several.
     pub unit: &'static str,
-    /// One value; three for accelerometers (x, y, z), gyrometers (the same) and positions (latitude, longitude in degrees, altitude in m).
+    /// One value; three for accelerometers (x, y, z), gyrometers (the same), colours (red, green, blue) and positions (latitude, longitude in degrees, altitude in m).
     pub values: Vec<f64>,
 }
 
@@ -46,7 +63,7 @@ pub fn readings(payload: &[u8]) -> Result<Vec<Reading>, Error> {
             return refuse(
                 "type of a reading",
                 kind,
-                "a type of Cayenne LPP: 0 to 3, 101 to 104, 113, 115, 128, 134 or 136",
+                "a type of Cayenne LPP of known length: 0 to 3, 100 to 104, 113, 115 to 118, 120, 121, 125, 128, 130 to 136 or 142",
             );
         };
         let Some((data, after)) = data.split_at_checked(*length) else {
@@ -102,6 +119,46 @@ mod tests {
         assert_eq!(moved[0].values, [1.234, -1.234, 0.0]);
         let place = readings(&[0x01, 0x88, 0x06, 0x76, 0x5f, 0xf2, 0x96, 0x0a, 0x00, 0x03, 0xe8]).unwrap();
         assert_eq!(place[0].values, [42.3519, -87.9094, 10.0]);
+    }
+
+    /// Defect: power (128) was read as a frequency of four bytes, and what libraries added was refused.
+    #[test]
+    fn types_of_libraries_are_read() {
+        let payload = [
+            [1, 116, 0x01, 0x4a].as_slice(),
+            &[2, 128, 0xff, 0xfe],
+            &[3, 121, 0xff, 0xfe],
+            &[4, 118, 0x00, 0x01, 0x00, 0x01],
+            &[5, 130, 0x00, 0x00, 0x04, 0xd2],
+            &[6, 142, 1],
+            &[7, 135, 255, 0, 128],
+            &[8, 120, 93],
+        ]
+        .concat();
+        let found = readings(&payload).unwrap();
+        let all: Vec<_> = found
+            .iter()
+            .map(|r| (r.channel, r.kind, r.unit, &r.values[..]))
+            .collect();
+        assert_eq!(
+            all,
+            [
+                (1, "voltage", "V", &[3.3][..]),
+                (2, "power", "W", &[65534.0]),
+                (3, "altitude", "m", &[-2.0]),
+                (4, "frequency", "Hz", &[65537.0]),
+                (5, "distance", "m", &[1.234]),
+                (6, "switch", "", &[1.0]),
+                (7, "colour", "", &[255.0, 0.0, 128.0]),
+                (8, "percentage", "%", &[93.0]),
+            ]
+        );
+        assert!(
+            TYPES
+                .iter()
+                .all(|(.., length, parts)| *length == parts.iter().map(|part| part.0).sum::<usize>())
+        );
+        assert!(TYPES.is_sorted_by_key(|one| one.0) && readings(&[1, 240, 8, 0, 0, 0, 0, 0, 0, 0]).is_err());
     }
 
     #[test]

@@ -30,9 +30,18 @@ pub struct Uplink {
 /// # Errors
 /// If the text is not JSON, or an uplink has bytes that are not base64 or a port that is not one.
 pub fn uplink(message: &str) -> Result<Option<Uplink>, Error> {
-    let Ok(message) = serde_json::from_str::<Value>(message) else {
+    let Ok(mut message) = serde_json::from_str::<Value>(message) else {
         return refuse("uplink", "no JSON", "the JSON of ChirpStack or The Things Stack");
     };
+    // What The Things Stack has stored, and its stream of events, wrap each message.
+    for wrap in ["result", "data"] {
+        if message
+            .get(wrap)
+            .is_some_and(|inner| inner.get("uplink_message").is_some())
+        {
+            message = message[wrap].take();
+        }
+    }
     let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
     // Where each server's format has device, port, counter, bytes and time.
     let found = if let Some(info) = message.get("deviceInfo") {
@@ -43,7 +52,8 @@ pub fn uplink(message: &str) -> Result<Option<Uplink>, Error> {
         Some((eui_of(eui), &message["fPort"], &message["fCnt"], message.get("data"), time))
     } else if let Some(up) = message.get("uplink_message") {
         let time = up.get("received_at").unwrap_or(&message["received_at"]);
-        let device = text(&message["end_device_ids"]["device_id"]);
+        let ids = &message["end_device_ids"];
+        let device = text(ids.get("device_id").unwrap_or(&ids["dev_eui"]));
         Some((device, &up["f_port"], &up["f_cnt"], up.get("frm_payload"), time))
     } else if message.get("payload_raw").is_some() {
         let (device, data) = (text(&message["dev_id"]), message.get("payload_raw"));
@@ -147,6 +157,11 @@ mod tests {
                 "received_at": "2026-03-01T12:00:00Z" } }),
             json!({ "app_id": "app1", "dev_id": "hall", "hardware_serial": "0101010101010101", "port": 7, "counter": 2,
                 "payload_raw": payload, "metadata": { "time": "2026-03-01T12:00:00Z" } }),
+            json!({ "result": { "end_device_ids": { "device_id": "hall" }, "received_at": "2026-03-01T12:00:00Z", "uplink_message":
+                { "f_port": 7, "f_cnt": 2, "frm_payload": payload } } }),
+            json!({ "name": "as.up.data.forward", "time": "2026-03-01T12:00:09Z", "data": { "@type": "ApplicationUp", "end_device_ids":
+                { "device_id": "hall" }, "received_at": "2026-03-01T12:00:00Z", "uplink_message": { "f_port": 7, "f_cnt": 2,
+                "frm_payload": payload } } }),
         ];
         for (i, message) in messages.iter().enumerate() {
             let found = uplink(&message.to_string()).unwrap().unwrap();

@@ -3,6 +3,7 @@
 mod address;
 mod output;
 mod stored;
+mod told;
 
 pub use output::{Counts, Output, Peer, Start, Step};
 
@@ -23,8 +24,6 @@ use stored::{Remote, Stored, text_of};
 
 /// Largest number of envelopes to one sensor in one slot.
 const COUNTERS_PER_SLOT: u64 = 1 << 16;
-/// A clock that is behind is reported once in so many nanoseconds.
-const REPORT_CLOCK_EVERY: u64 = 60_000_000_000;
 
 /// A centre. Its inputs are datagrams and time, its outputs [`Output`]s.
 ///
@@ -55,6 +54,8 @@ pub struct Station<R, A = SocketAddr> {
     is_held: bool,
     /// When it was last said that the clock is behind.
     said_behind: Option<u64>,
+    /// Whether a slot has begun since this station was made, so that counters are known that were never used.
+    has_begun: bool,
     /// The estimator's state as it is stored, until the estimator changes.
     state: Option<String>,
 }
@@ -132,6 +133,7 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
             last,
             is_held: false,
             said_behind: None,
+            has_begun: false,
             state: None,
         })
     }
@@ -181,30 +183,16 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
     /// If the estimator's state cannot be written.
     pub fn on_time(&mut self, now: u64, outputs: &mut Vec<Output<A>>) -> Result<(), Error> {
         while let Some(entry) = self.timers.first_entry().filter(|entry| *entry.key() <= now) {
+            let due = *entry.key();
             for timer in entry.remove() {
                 let mut actions = Vec::new();
                 self.centre.on_timer(now, timer, &mut actions);
+                self.look_at_start(now, due, timer, outputs);
                 self.carry_out(actions, outputs)?;
             }
         }
         self.look_at_clock(now, outputs);
         Ok(())
-    }
-
-    /// Says that no slot begins because the clock is at least two slots behind the last one.
-    fn look_at_clock(&mut self, now: u64, outputs: &mut Vec<Output<A>>) {
-        let schedule = &self.centre.settings().schedule;
-        if self.centre.slot() < schedule.count(now).saturating_add(2) {
-            self.said_behind = None;
-            return;
-        }
-        let is_new = |said: u64| now < said || now - said >= REPORT_CLOCK_EVERY;
-        if self.said_behind.is_none_or(is_new) {
-            self.said_behind = Some(now);
-            let wait = schedule.start(self.centre.slot().saturating_add(1)).saturating_sub(now);
-            tracing::warn!(seconds = wait / 1_000_000_000, "no slot begins: the clock is behind the last one");
-            outputs.push(Output::ClockBehind { wait });
-        }
     }
 
     /// A datagram has arrived from the address `from`.
@@ -250,7 +238,9 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
         self.remotes[place].addresses.on_accepted(from, counter, answers);
         let mut actions = Vec::new();
         self.centre.on_frame(place, frame, &mut actions);
-        self.carry_out(actions, outputs)
+        self.carry_out(actions, outputs)?;
+        self.answer_hello(place, frame, answers, outputs);
+        Ok(())
     }
 
     fn carry_out(&mut self, actions: Vec<Action>, outputs: &mut Vec<Output<A>>) -> Result<(), Error> {
@@ -338,6 +328,7 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
         if !self.store_and_publish(slot, outputs)? {
             return Ok(());
         }
+        self.has_begun = true;
         let members = &self.centre.settings().members;
         // A sensor that needs feedback and whose address is unknown is not asked.
         for (member, remote) in members.iter().zip(&mut self.remotes) {

@@ -4,6 +4,7 @@
 mod attacks;
 mod floods;
 mod followed;
+mod hellos;
 mod live;
 mod pairs;
 mod prometheus;

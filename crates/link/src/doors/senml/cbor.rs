@@ -20,8 +20,10 @@ const LABELS: [(i64, &str); 15] = [
     (7, "ut"),
     (8, "vd"),
 ];
-/// A list of records with fields is this deep.
-const MAX_DEPTH: usize = 3;
+/// A list of records with fields is three deep; fields of others may be deeper.
+const MAX_DEPTH: usize = 16;
+/// Largest exponent of a decimal fraction: doubles end before.
+const MAX_EXPONENT: i64 = 400;
 /// What ends an item of indefinite length.
 const BREAK: u8 = 0xff;
 
@@ -29,9 +31,15 @@ const BASE64: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz
 
 /// The list, or nothing if the bytes are not CBOR of this kind.
 pub(super) fn read(bytes: &[u8]) -> Option<Json> {
+    let (list, rest) = first(bytes)?;
+    rest.is_empty().then_some(list)
+}
+
+/// The first list, and what follows it.
+pub(super) fn first(bytes: &[u8]) -> Option<(Json, &[u8])> {
     let mut rest = bytes;
     let list = item(&mut rest, MAX_DEPTH)?;
-    rest.is_empty().then_some(list)
+    Some((list, rest))
 }
 
 fn take<'a>(rest: &mut &'a [u8], count: usize) -> Option<&'a [u8]> {
@@ -61,8 +69,14 @@ fn item(rest: &mut &[u8], depth: usize) -> Option<Json> {
     match (kind, argument) {
         (0, Some(n)) => Some(n.into()),
         (1, Some(n)) => Some((-1 - i64::try_from(n).ok()?).into()),
-        (2, Some(n)) => Some(base64(take(rest, usize::try_from(n).ok()?)?).into()),
-        (3, Some(n)) => Some(std::str::from_utf8(take(rest, usize::try_from(n).ok()?)?).ok()?.into()),
+        (2, length) => Some(base64(&string(rest, 2, length)?).into()),
+        (3, length) => Some(String::from_utf8(string(rest, 3, length)?).ok()?.into()),
+        // A decimal fraction is a number here (RFC 8428, section 6); what other tags say does not matter.
+        (6, Some(4)) => match item(rest, depth)? {
+            Json::Array(parts) => decimal(&parts),
+            _ => None,
+        },
+        (6, Some(_)) => item(rest, depth),
         (4, length) => {
             let mut items = Vec::new();
             while !ends(rest, length, items.len()) {
@@ -81,6 +95,7 @@ fn item(rest: &mut &[u8], depth: usize) -> Option<Json> {
         }
         (7, Some(n)) => match low {
             20 | 21 => Some((low == 21).into()),
+            22 | 23 => Some(Json::Null),
             25 => number(half(n as u16)),
             26 => number(f32::from_bits(n as u32).into()),
             27 => number(f64::from_bits(n)),
@@ -92,6 +107,28 @@ fn item(rest: &mut &[u8], depth: usize) -> Option<Json> {
 
 fn number(value: f64) -> Option<Json> {
     Number::from_f64(value).map(Json::Number)
+}
+
+/// The double nearest to `m 10^e`, of `[e, m]`.
+fn decimal(parts: &[Json]) -> Option<Json> {
+    let [exponent, mantissa] = parts else { return None };
+    let exponent = exponent.as_i64().filter(|e| e.abs() <= MAX_EXPONENT)?;
+    let mantissa = mantissa.as_number().filter(|number| !number.is_f64())?;
+    number(format!("{mantissa}e{exponent}").parse().ok()?)
+}
+
+/// The bytes of a string, which may come in chunks of known length.
+fn string(rest: &mut &[u8], kind: u8, length: Option<u64>) -> Option<Vec<u8>> {
+    if let Some(length) = length {
+        return Some(take(rest, usize::try_from(length).ok()?)?.to_vec());
+    }
+    let mut bytes = Vec::new();
+    while !ends(rest, None, 0) {
+        let (own, length, _) = head(rest)?;
+        let length = length.filter(|_| own == kind)?;
+        bytes.extend(take(rest, usize::try_from(length).ok()?)?);
+    }
+    Some(bytes)
 }
 
 /// Whether a list or map ends here; if its length is indefinite, the byte that ends it is taken.
@@ -111,19 +148,12 @@ fn name(rest: &mut &[u8]) -> Option<String> {
     let label = match head(rest)? {
         (0, Some(n), _) => i64::try_from(n).ok()?,
         (1, Some(n), _) => -1 - i64::try_from(n).ok()?,
-        (3, Some(n), _) => {
-            return Some(
-                std::str::from_utf8(take(rest, usize::try_from(n).ok()?)?)
-                    .ok()?
-                    .to_owned(),
-            );
-        }
+        (3, length, _) => return String::from_utf8(string(rest, 3, length)?).ok(),
         _ => return None,
     };
-    LABELS
-        .iter()
-        .find(|(known, _)| *known == label)
-        .map(|(_, name)| (*name).to_owned())
+    let known = LABELS.iter().find(|(known, _)| *known == label);
+    // A label that is not known is the name of a field that may be left out.
+    Some(known.map_or_else(|| label.to_string(), |(_, name)| (*name).to_owned()))
 }
 
 /// A float of 16 bits (RFC 8949, appendix D).

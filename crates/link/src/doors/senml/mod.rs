@@ -82,6 +82,11 @@ pub fn from_cbor(bytes: &[u8], now: f64) -> Result<Vec<Record>, Error> {
     }
 }
 
+/// Number of bytes of the first list in CBOR, where lists follow one behind the other; `None` if the bytes do not begin with one.
+pub fn cbor_length(bytes: &[u8]) -> Option<usize> {
+    cbor::first(bytes).map(|(_, rest)| bytes.len() - rest.len())
+}
+
 /// Writes records as JSON.
 ///
 /// # Errors

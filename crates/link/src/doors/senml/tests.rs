@@ -87,3 +87,56 @@ fn any_bytes_are_read_or_refused() {
     let read = from_cbor(&short, NOW).unwrap();
     assert_eq!(read, [Record::new("a", "", 1.5, NOW), Record::new("b", "", 1.5, NOW)]);
 }
+
+/// Forms of CBOR that other encoders write: decimal fractions, tags, strings in chunks, labels and values that are not known.
+#[test]
+fn legal_forms_of_cbor_are_read() {
+    let expected = [Record::new("ab", "Cel", -27.35, NOW)];
+    let forms: [&[u8]; 6] = [
+        // [{0: "ab", 1: "Cel", 2: 4([-2, -2735])}], plain, and all of it under the tag that says "this is CBOR".
+        &[
+            0x81, 0xa3, 0, 0x62, b'a', b'b', 1, 0x63, b'C', b'e', b'l', 2, 0xc4, 0x82, 0x21, 0x39, 0x0a, 0xae,
+        ],
+        &[
+            0xd9, 0xd9, 0xf7, 0x81, 0xa3, 0, 0x62, b'a', b'b', 1, 0x63, b'C', b'e', b'l', 2, 0xc4, 0x82, 0x21, 0x39,
+            0x0a, 0xae,
+        ],
+        // The name in two chunks.
+        &[
+            0x81, 0xa3, 0, 0x7f, 0x61, b'a', 0x61, b'b', 0xff, 1, 0x63, b'C', b'e', b'l', 2, 0xc4, 0x82, 0x21, 0x39,
+            0x0a, 0xae,
+        ],
+        // A field of a number that is not known, another with a list of lists, a third without a value.
+        &[
+            0x81, 0xa4, 0x18, 99, 5, 0, 0x62, b'a', b'b', 1, 0x63, b'C', b'e', b'l', 2, 0xc4, 0x82, 0x21, 0x39, 0x0a,
+            0xae,
+        ],
+        &[
+            0x81, 0xa4, 0x61, b'x', 0x81, 0x81, 0x80, 0, 0x62, b'a', b'b', 1, 0x63, b'C', b'e', b'l', 2, 0xc4, 0x82,
+            0x21, 0x39, 0x0a, 0xae,
+        ],
+        &[
+            0x81, 0xa4, 0x61, b'x', 0xf6, 0, 0x62, b'a', b'b', 1, 0x63, b'C', b'e', b'l', 2, 0xc4, 0x82, 0x21, 0x39,
+            0x0a, 0xae,
+        ],
+    ];
+    for form in forms {
+        assert_eq!(from_cbor(form, NOW).unwrap(), expected, "{form:x?}");
+        // Lists one behind the other are told apart.
+        let two = [form, form].concat();
+        assert_eq!(cbor_length(&two), Some(form.len()));
+        assert!(from_cbor(&two, NOW).is_err());
+    }
+    // Numbers beyond a double, fractions of other things, an endless string.
+    for bad in [
+        &[0x81, 0xa2, 0, 0x61, b'a', 2, 0xc4, 0x82, 0x19, 0x01, 0x90, 1][..],
+        &[
+            0x81, 0xa2, 0, 0x61, b'a', 2, 0xc4, 0x82, 0x1b, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 1,
+        ],
+        &[0x81, 0xa2, 0, 0x61, b'a', 2, 0xc4, 0x01],
+        &[0x81, 0xa2, 0, 0x7f, 0x61, b'a', 2, 0x01],
+        &[0xc1; 100_000],
+    ] {
+        assert!(from_cbor(bad, NOW).is_err() && cbor_length(&[]).is_none());
+    }
+}
