@@ -29,6 +29,8 @@ mod hints;
 mod late;
 mod level;
 mod meaning;
+mod odometry;
+mod path;
 mod ranges;
 mod report;
 mod rhythm;
@@ -68,5 +70,9 @@ pub(crate) fn ranges(options: &RangesOptions) -> Result<Ending, Error> {
         by: options.table.by.clone(),
         ..Kind::default()
     };
-    ranges::run(options, Instants::open(&options.table, &kind)?)
+    let mut table = options.table.clone();
+    if table.by.is_none() && !table.columns.is_empty() {
+        table.columns.extend(options.odometry.iter().cloned());
+    }
+    ranges::run(options, Instants::open(&table, &kind)?)
 }

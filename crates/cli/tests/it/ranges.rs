@@ -314,3 +314,92 @@ fn a_height_that_no_option_says_is_found_or_asked_for() {
     let message = refused(folder.path(), &["ranges", "walk.csv", "--anchors", "anchors.csv"], b"");
     assert!(message.contains("--height is needed"), "{message}");
 }
+
+/// Columns of what the target moved since the row before: it is followed between ranges, in rows without any too.
+#[test]
+fn odometry_carries_the_place_between_ranges() {
+    let folder = tempfile::tempdir().unwrap();
+    anchors(folder.path(), &RECTANGLE, 1.0, false);
+    let at = |row: usize| {
+        let angle = 0.9 * row as f64;
+        [6.0 + 2.0 * angle.cos(), 3.5 + 2.0 * (1.7 * angle).sin(), 0.0]
+    };
+    let mut numbers = Numbers(5);
+    let mut input = "time,n0,n1,n2,n3,dx,dy\n".to_owned();
+    for row in 0..120 {
+        let (here, before) = (at(row), at(row.saturating_sub(1)));
+        let cells: Vec<String> = (0..4)
+            .map(|i| {
+                let is_there = row < 4 || row % 5 == 0;
+                let range = distance(&RECTANGLE[i], &here) + 0.03 * numbers.normal();
+                if is_there { range.to_string() } else { String::new() }
+            })
+            .collect();
+        let moved = [here[0] - before[0], here[1] - before[1]];
+        input += &format!("{row},{},{},{}\n", cells.join(","), moved[0], moved[1]);
+    }
+    let options = ["--bias", "0", "--scale", "0"];
+    let rms = |rows: &[serde_json::Value]| {
+        let squares: f64 = rows
+            .iter()
+            .enumerate()
+            .map(|(row, one)| off(one, &at(row)).powi(2))
+            .sum();
+        (squares / rows.len() as f64).sqrt()
+    };
+    let with = ranges(folder.path(), &input, &[&options[..], &["--odometry", "dx,dy"]].concat());
+    assert!(with.iter().all(|row| row["x"].is_f64()), "{with:?}");
+    assert!(rms(&with) < 0.15, "{}", rms(&with));
+    // The same as reports of a long table.
+    let mut long = "time,anchor,value\n".to_owned();
+    for line in input.lines().skip(1) {
+        let cells: Vec<&str> = line.split(',').collect();
+        let names = ["n0", "n1", "n2", "n3", "dx", "dy"];
+        for (name, cell) in names.iter().zip(&cells[1..]).filter(|(_, cell)| !cell.is_empty()) {
+            long += &format!("{},{name},{cell}\n", cells[0]);
+        }
+    }
+    let words = [&options[..], &["--odometry", "dx,dy", "--by", "anchor"]].concat();
+    assert!(rms(&ranges(folder.path(), &long, &words)) < 0.15);
+    let words = ["ranges", "-", "--anchors", "anchors.csv", "--odometry"];
+    for (bad, why) in [
+        ("dx", "two columns"),
+        ("dx,dz", "no column `dz`"),
+        ("dx,n0", "no anchor"),
+    ] {
+        let error = refused(folder.path(), &[&words[..], &[bad]].concat(), input.as_bytes());
+        assert!(error.contains(why), "{bad}: {error}");
+    }
+}
+
+/// With bias and scale unknown, four anchors explain almost anything: if one is too long, the row must say that something is wrong, or hold the
+/// place. Calibrated ranges say nothing.
+#[test]
+fn an_anchor_that_bias_and_scale_take_up_is_doubtful() {
+    let folder = tempfile::tempdir().unwrap();
+    let places = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 3.0, 0.0], [0.0, 3.0, 0.0]];
+    anchors(folder.path(), &places, 1.0, false);
+    for (seed, truth) in [
+        (1, [1.4, 0.9, 0.0]),
+        (2, [2.6, 1.8, 0.0]),
+        (3, [1.1, 2.1, 0.0]),
+        (4, [2.9, 0.7, 0.0]),
+    ] {
+        for (bad, late) in [(0, 1.5), (2, 1.5), (1, 2.0)] {
+            let mut numbers = Numbers(seed);
+            let input = table(4, 100, |_, i| {
+                distance(&places[i], &truth) + 0.04 * numbers.normal() + if i == bad { late } else { 0.0 }
+            });
+            let rows = ranges(folder.path(), &input, &[]);
+            let silent = rows[40..]
+                .iter()
+                .filter(|row| row["events"].as_str().unwrap_or_default().is_empty() && !holds(row, &truth))
+                .count();
+            assert_eq!(silent, 0, "{truth:?}, anchor {bad}: {}", rows[99]);
+        }
+        let mut numbers = Numbers(10 + seed);
+        let good = table(4, 100, |_, i| distance(&places[i], &truth) + 0.04 * numbers.normal());
+        let rows = ranges(folder.path(), &good, &[]);
+        assert!(rows.iter().all(|row| row["events"] != "doubtful"), "{truth:?}");
+    }
+}

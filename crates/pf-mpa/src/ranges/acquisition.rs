@@ -21,7 +21,7 @@ use super::settings::Known;
 
 /// Sets and places that become hypotheses at most, and by how many nats they may be worse than the best.
 const KEPT: usize = 6;
-const WORSE: f64 = 14.0;
+const WORSE: f64 = 9.2;
 /// Prior probability that the range of an anchor does not depend on the distance beside that of an outlier.
 const BAD_ANCHOR: f64 = 0.01;
 /// Probability that an anchor is good before its first range, and after a first range that was an outlier.
@@ -69,14 +69,16 @@ pub(super) fn hypotheses(
     };
     // An outlier, or an anchor whose ranges say nothing, is as probable as `bad`, and its range as `1 / stray`.
     let bad = known.outliers + BAD_ANCHOR;
-    let penalty = |without: Option<usize>, ranges: usize| {
-        ranges as f64 * (1.0 - bad).ln()
-            + if without.is_some() {
-                (bad / known.stray).ln()
-            } else {
-                0.0
-            }
+    let penalty = |without: Option<usize>| {
+        let ranges = collected.len() - usize::from(without.is_some());
+        let apart = if without.is_some() {
+            (bad / known.stray).ln()
+        } else {
+            0.0
+        };
+        ranges as f64 * (1.0 - bad).ln() + apart
     };
+    let likely = |one: &Found| one.log_evidence + penalty(one.without) + one.log_share();
     let mut found: Vec<Found> = Vec::new();
     let singles = if collected.len() > least {
         0..collected.len()
@@ -86,10 +88,9 @@ pub(super) fn hypotheses(
     for without in std::iter::once(None).chain(singles.map(Some)) {
         let ranges = left(without);
         for start in search.maxima(&ranges) {
-            let Some(mut best) = search.best(&start, &ranges, without, typical) else {
+            let Some(best) = search.best(&start, &ranges, without, typical) else {
                 continue;
             };
-            best.log_evidence += penalty(without, ranges.len());
             let twin = found
                 .iter_mut()
                 .find(|other| other.without == without && is_same(&other.normal, &best.normal));
@@ -100,11 +101,11 @@ pub(super) fn hypotheses(
             }
         }
     }
-    found.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-    let Some(best) = found.first().map(|best| best.log_evidence) else {
+    found.sort_by(|a, b| likely(b).total_cmp(&likely(a)));
+    let Some(best) = found.first().map(likely) else {
         return Vec::new();
     };
-    found.retain(|one| one.log_evidence > best - WORSE);
+    found.retain(|one| likely(one) > best - WORSE);
     found.truncate(KEPT);
     let mut parts: Vec<(Search<'_>, Found, f64)> = Vec::new();
     for one in found {
@@ -126,6 +127,11 @@ pub(super) fn hypotheses(
         let slices = if slices.is_empty() { vec![one] } else { slices };
         parts.extend(slices.into_iter().map(|slice| (search, slice, 0.0)));
     }
+    let best = parts
+        .iter()
+        .map(|(_, one, log_share)| likely(one) + log_share)
+        .fold(f64::NEG_INFINITY, f64::max);
+    parts.retain(|(_, one, log_share)| likely(one) + log_share > best - WORSE);
     let mut all = Vec::new();
     for (search, one, log_share) in &parts {
         let ranges = left(one.without);
@@ -137,7 +143,7 @@ pub(super) fn hypotheses(
             let Some((filters, weights, log_evidence)) = search.bank(one, &ranges, *own) else {
                 continue;
             };
-            let log_weight = log_evidence + penalty(one.without, ranges.len()) + probability.ln() + log_share;
+            let log_weight = log_evidence + penalty(one.without) + probability.ln() + log_share;
             all.push(Hypothesis::new(log_weight, filters, weights, good.clone(), variant));
         }
     }
@@ -146,28 +152,28 @@ pub(super) fn hypotheses(
     all
 }
 
-/// A place cut by the error of scale: what each piece is searched with, the place, and `ln` of the piece's share.
+/// A place cut by the error of scale: what each piece is searched with, the places, and `ln` of the piece's share. A curve may have two places
+/// for one error of scale, or none.
 fn pieces<'a>(search: &Search<'a>, one: &Found, ranges: &[Collected], typical: f64) -> Vec<(Search<'a>, Found, f64)> {
     let [bias, (middle, variance)] = search.calibration;
     let deviation = variance.sqrt();
-    let mut found = Vec::new();
-    for sign in [1.0, -1.0] {
-        let mut from = one.normal.mean.clone();
-        for (off, share) in PIECES {
-            // The middle belongs to the first direction; each piece starts where its neighbour ended.
-            if off * sign < 0.0 || off == 0.0 && sign < 0.0 {
-                continue;
-            }
-            let scale = (middle + off * deviation, (PIECE * deviation).powi(2));
-            let piece = Search {
-                calibration: [bias, scale],
-                ..*search
-            };
-            if let Some(place) = piece.best(&from, ranges, one.without, typical) {
-                from.clone_from(&place.normal.mean);
-                found.push((piece, place, share.ln()));
+    let mut found: Vec<(Search<'a>, Found, f64)> = Vec::new();
+    for (off, share) in PIECES {
+        let scale = (middle + off * deviation, (PIECE * deviation).powi(2));
+        let piece = Search {
+            calibration: [bias, scale],
+            ..*search
+        };
+        let mut own: Vec<Found> = Vec::new();
+        let starts = piece.maxima(ranges).into_iter().map(|start| start.to_vec());
+        for start in starts.chain([one.normal.mean.clone()]) {
+            if let Some(place) = piece.best(&start, ranges, one.without, typical)
+                && !own.iter().any(|known| is_same(&known.normal, &place.normal))
+            {
+                own.push(place);
             }
         }
+        found.extend(own.into_iter().map(|place| (piece, place, share.ln())));
     }
     found
 }

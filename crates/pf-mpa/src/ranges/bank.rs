@@ -13,9 +13,9 @@ const MIXED: u32 = 5;
 /// Probability per range of an anchor that it starts, or ceases, to send ranges that do not depend on the distance.
 const ANCHOR_CHANGES: f64 = 1e-3;
 /// A share of its neighbours below this does not change the moments of a filter.
-const NEGLIGIBLE: f64 = 1e-6;
+const NEGLIGIBLE: f64 = 1e-4;
 /// A filter of less weight than this is left out, until changes from its neighbours reach it again.
-const LEFT_OUT: f64 = 1e-6;
+const LEFT_OUT: f64 = 1e-5;
 /// Share of a range's score that stays in the sum of an anchor's scores.
 const SCORE_KEPT: f64 = 0.9;
 /// Share of a range's evidence that stays in the recent evidence, and by how many nats that of two hypotheses may differ without deciding.
@@ -126,10 +126,22 @@ impl Hypothesis {
                 self.mix(speed * noises..(speed + 1) * noises, changes(NOISE_CHANGES));
             }
         }
+        self.carry(known, step, &[0.0; 3]);
+    }
+
+    /// Moves all filters on, and by a displacement.
+    pub(super) fn carry(&mut self, known: &Known, step: &Step, by: &[f64; 3]) {
+        let noises = known.noises.len();
         for (i, filter) in self.filters.iter_mut().enumerate() {
             if self.weights[i] > 0.0 {
                 let speed = known.speeds[i / noises];
                 filter.predict(step, speed * speed);
+                filter
+                    .mean
+                    .iter_mut()
+                    .take(known.axes)
+                    .zip(by)
+                    .for_each(|(x, by)| *x += by);
             }
         }
     }
@@ -314,6 +326,32 @@ impl Hypothesis {
         }
         let variance = 2.0 / (9.0 * count);
         ((sum / count).cbrt() - (1.0 - variance)) / variance.sqrt()
+    }
+
+    /// The common moments of some coordinates: mean, and covariance row by row.
+    pub(super) fn marginal<const N: usize>(&self, coordinates: &[usize; N]) -> ([f64; N], [[f64; N]; N]) {
+        let (mut mean, mut covariance) = ([0.0; N], [[0.0; N]; N]);
+        let total: f64 = self.parts().map(|(weight, _)| weight).sum();
+        for (weight, part) in self.parts() {
+            let share = weight / total;
+            for (sum, i) in mean.iter_mut().zip(coordinates) {
+                *sum += share * part.mean[*i];
+            }
+        }
+        for (weight, part) in self.parts() {
+            let (share, n) = (weight / total, part.mean.len());
+            let mut off = [0.0; N];
+            for ((off, mean), i) in off.iter_mut().zip(&mean).zip(coordinates) {
+                *off = part.mean[*i] - mean;
+            }
+            for (a, i) in coordinates.iter().enumerate() {
+                let row = &part.covariance[i * n..(i + 1) * n];
+                for (b, j) in coordinates.iter().enumerate() {
+                    covariance[a][b] += share * (row[*j] + off[a] * off[b]);
+                }
+            }
+        }
+        (mean, covariance)
     }
 
     /// The filters' common moments.

@@ -5,7 +5,7 @@ use super::bank::Hypothesis;
 use super::gaussian::Normal;
 
 /// A hypothesis is dropped if its probability is less than this share of the best one's.
-const DROPPED: f64 = 1e-5;
+const DROPPED: f64 = 1e-4;
 
 /// The track is lost if fewer than this share of the latest ranges agree.
 const AGREEMENT: f64 = 0.35;
@@ -44,6 +44,9 @@ pub(super) fn drop_improbable(hypotheses: &mut Vec<Hypothesis>) -> f64 {
 
 /// Of hypotheses about the same place with the same model, keeps the most probable, with the probability of all.
 pub(super) fn merge_same(hypotheses: &mut Vec<Hypothesis>) {
+    if hypotheses.len() < 2 {
+        return;
+    }
     hypotheses.sort_by(|a, b| b.log_share().total_cmp(&a.log_share()));
     let mut kept: Vec<(Hypothesis, Option<Normal>)> = Vec::new();
     for one in hypotheses.drain(..) {
