@@ -54,6 +54,9 @@ pub(crate) struct RangesOptions {
     /// Seconds without a range after which the place is searched again.
     #[arg(long, default_value_t = 30.0, value_name = "SECONDS")]
     pub(crate) silence: f64,
+    /// Rows may be so much late, as `60s`: each waits that long, by the times of the rows, for earlier ones. Default: rows are in order.
+    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    pub(crate) late: Option<std::time::Duration>,
     /// Draw the estimates into this SVG file.
     #[arg(long, value_name = "FILE.svg")]
     pub(crate) plot: Option<PathBuf>,

@@ -17,8 +17,10 @@
 //! | `fit` | the task `fit`: calibration |
 //! | `level` | the task `track`: a level |
 //! | `ranges` | the task `ranges`: a place |
+//! | `anchors`, `odometry`, `path` | the table of its anchors, the columns of what the target moved, the picture |
 //! | `height` | the height of its target |
 
+mod anchors;
 mod applied;
 mod centre;
 mod first;
@@ -68,6 +70,7 @@ pub(crate) fn fit(options: &FitOptions) -> Result<Ending, Error> {
 pub(crate) fn ranges(options: &RangesOptions) -> Result<Ending, Error> {
     let kind = Kind {
         by: options.table.by.clone(),
+        late: options.late.map_or(0.0, |late| late.as_secs_f64()),
         ..Kind::default()
     };
     let mut table = options.table.clone();

@@ -1,6 +1,6 @@
 //! Odometry of `ranges`: columns of what the target moved since the row before.
 
-use super::ranges::Anchor;
+use super::anchors::Anchor;
 use super::rows::{Instant, Instants};
 use crate::arguments::RangesOptions;
 use crate::error::Error;

@@ -1,6 +1,6 @@
 //! The picture of a path among anchors.
 
-use super::ranges::Anchor;
+use super::anchors::Anchor;
 use super::report::BAND;
 use crate::plot::{Layer, Picture};
 use nalgebra::Vector2;

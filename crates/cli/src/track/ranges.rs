@@ -1,5 +1,6 @@
 //! Tracking of a position by distances to anchors.
 
+use super::anchors::read_anchors;
 use super::height::height_found;
 use super::odometry::Odometry;
 use super::path;
@@ -7,23 +8,17 @@ use super::report::{first_cell, first_name, summarise};
 use super::rows::{Instant, Instants};
 use super::sensors;
 use crate::Ending;
-use crate::arguments::{RangesOptions, TableOptions, TrackOptions};
+use crate::arguments::{RangesOptions, TrackOptions};
 use crate::error::Error;
-use crate::input::Table;
 use crate::numbers::{number, short};
 use crate::output::{Cell, Shape, Sheet};
 use crate::plot::Thinned;
 use crate::report::Report;
 use fewbits_pf_mpa::{Height, RangeEstimate, RangeSettings, RangeTracker, Travel};
-use fewbits_record::TimeBase;
-use nalgebra::Vector3;
 use serde::Serialize;
 
 /// A track that is lost once in so many rows is lost often.
 const OFTEN: u64 = 20;
-
-/// Name and place of an anchor.
-pub(super) type Anchor = (String, Vector3<f64>);
 
 #[derive(Serialize)]
 struct Summary {
@@ -37,6 +32,8 @@ struct Summary {
     ambiguous: u64,
     /// Number of rows in which bias and scale contradict what is supposed of them.
     doubtful: u64,
+    /// Number of ranges that were left out because they are negative.
+    negative: u64,
     losses: usize,
     anchors: Vec<AnchorSummary>,
     /// What the ranges suggest that no option says.
@@ -76,45 +73,11 @@ pub(super) fn options(track: &TrackOptions, anchors: &str) -> Result<RangesOptio
         persistence: track.persistence,
         outliers: track.outliers,
         silence: RangeSettings::default().silence,
+        late: track.late,
         plot: track.plot.clone(),
         json: track.json,
         output: track.output.clone(),
     })
-}
-
-/// Reads names and places: the first column, and the two or three after it.
-fn read_anchors(file: &str) -> Result<Vec<Anchor>, Error> {
-    let options = |columns: Vec<String>| TableOptions {
-        file: file.to_owned(),
-        columns,
-        ..TableOptions::default()
-    };
-    let names = Table::open(&options(Vec::new()))?.names;
-    let [name, places @ ..] = names.as_slice() else {
-        return Err(Error::empty(file, "columns"));
-    };
-    if !(2..=3).contains(&places.len()) {
-        let problem = format!("columns {}: three or four are expected, name, x, y and perhaps z", names.join(", "));
-        return Err(Error::content(file, problem));
-    }
-    let mut table = Table::open(&options(places.to_vec()))?.with_labels(name)?;
-    table.require_numbers()?;
-    let mut anchors: Vec<Anchor> = Vec::new();
-    while let Some((_, cells)) = table.next(TimeBase::Numbered)? {
-        let (label, row) = (table.label().to_owned(), table.row());
-        let is_whole = cells.iter().all(|cell| cell.is_some_and(f64::is_finite));
-        let at = |i: usize| cells.get(i).copied().flatten().unwrap_or(0.0);
-        let problem = if anchors.iter().any(|(known, _)| *known == label) {
-            format!("anchor `{label}` stands here twice")
-        } else if is_whole {
-            anchors.push((label, Vector3::new(at(0), at(1), at(2))));
-            continue;
-        } else {
-            format!("anchor `{label}` has no place: write {}", places.join(", "))
-        };
-        return Err(Error::content(file, format_args!("row {row}: {problem}")));
-    }
-    Ok(anchors)
 }
 
 fn settings(options: &RangesOptions) -> Result<RangeSettings, Error> {
@@ -215,6 +178,7 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
         searching: 0,
         ambiguous: 0,
         doubtful: 0,
+        negative: 0,
         losses: 0,
         hints: Vec::new(),
         anchors: anchors
@@ -245,6 +209,10 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
             let Some(anchor) = known(name) else {
                 return Err(unknown(instants.file(), name, file));
             };
+            if range < 0.0 && !options.unknown_clock {
+                summary.negative += 1;
+                continue;
+            }
             let pushed = tracker.push(instant.seconds, name, range);
             let estimate = pushed.map_err(|source| refused_row(&instants, &instant, source))?;
             if estimate.as_ref().is_some_and(|estimate| estimate.lost) {
@@ -324,6 +292,12 @@ fn lines(summary: &Summary, tracker: &RangeTracker, silence: f64) -> Vec<String>
         lines.push(format!(
             "{} rows with several places that explain the ranges: the band holds them",
             summary.ambiguous
+        ));
+    }
+    if summary.negative > 0 {
+        lines.push(format!(
+            "{} negative ranges were left out: they are no distances; differences of ranges need --unknown-clock",
+            summary.negative
         ));
     }
     if summary.doubtful > summary.rows / OFTEN {

@@ -4,15 +4,15 @@ use crate::numbers::Numbers;
 use crate::{fewbits, good, refused, text};
 use std::path::Path;
 
-type Point = [f64; 3];
+pub(crate) type Point = [f64; 3];
 
-const RECTANGLE: [Point; 4] = [[0.0, 0.0, 0.0], [12.0, 0.0, 0.0], [12.0, 7.0, 0.0], [0.0, 7.0, 0.0]];
+pub(crate) const RECTANGLE: [Point; 4] = [[0.0, 0.0, 0.0], [12.0, 0.0, 0.0], [12.0, 7.0, 0.0], [0.0, 7.0, 0.0]];
 
-fn distance(a: &Point, b: &Point) -> f64 {
+pub(crate) fn distance(a: &Point, b: &Point) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
 }
 
-fn anchors(folder: &Path, places: &[Point], unit: f64, has_heights: bool) {
+pub(crate) fn anchors(folder: &Path, places: &[Point], unit: f64, has_heights: bool) {
     let mut table = if has_heights { "anchor,x,y,z\n" } else { "anchor,x,y\n" }.to_owned();
     for (i, place) in places.iter().enumerate() {
         table += &format!("n{i},{},{}", place[0] * unit, place[1] * unit);
@@ -26,7 +26,7 @@ fn anchors(folder: &Path, places: &[Point], unit: f64, has_heights: bool) {
 }
 
 /// Ranges of rows: what is read instead of the distance of each anchor. `NaN` is an empty cell.
-fn table(places: usize, rows: usize, mut range: impl FnMut(usize, usize) -> f64) -> String {
+pub(crate) fn table(places: usize, rows: usize, mut range: impl FnMut(usize, usize) -> f64) -> String {
     let names: Vec<String> = (0..places).map(|i| format!("n{i}")).collect();
     let mut table = format!("time,{}\n", names.join(","));
     for row in 0..rows {
@@ -39,7 +39,7 @@ fn table(places: usize, rows: usize, mut range: impl FnMut(usize, usize) -> f64)
     table
 }
 
-fn ranges(folder: &Path, table: &str, options: &[&str]) -> Vec<serde_json::Value> {
+pub(crate) fn ranges(folder: &Path, table: &str, options: &[&str]) -> Vec<serde_json::Value> {
     let words = [&["ranges", "-", "--anchors", "anchors.csv", "--json"], options].concat();
     let out = text(&good(folder, &words, table.as_bytes()));
     out.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
@@ -49,11 +49,11 @@ fn number(row: &serde_json::Value, name: &str) -> f64 {
     row[name].as_f64().unwrap_or(f64::NAN)
 }
 
-fn off(row: &serde_json::Value, truth: &Point) -> f64 {
+pub(crate) fn off(row: &serde_json::Value, truth: &Point) -> f64 {
     (number(row, "x") - truth[0]).hypot(number(row, "y") - truth[1])
 }
 
-fn holds(row: &serde_json::Value, truth: &Point) -> bool {
+pub(crate) fn holds(row: &serde_json::Value, truth: &Point) -> bool {
     ["x", "y"].iter().zip(truth).all(|(axis, truth)| {
         (number(row, &format!("{axis}_low"))..=number(row, &format!("{axis}_high"))).contains(truth)
     })
@@ -64,6 +64,7 @@ fn holds(row: &serde_json::Value, truth: &Point) -> bool {
 fn a_rectangle_of_anchors_has_no_ghost() {
     let folder = tempfile::tempdir().unwrap();
     anchors(folder.path(), &RECTANGLE, 1.0, false);
+    let (mut wrong, mut all) = (0, 0);
     for (seed, truth) in [
         (1, [4.0, 2.5, 0.0]),
         (2, [10.9, 1.2, 0.0]),
@@ -74,14 +75,15 @@ fn a_rectangle_of_anchors_has_no_ghost() {
             let mut numbers = Numbers(seed);
             let input = table(4, 60, |_, i| distance(&RECTANGLE[i], &truth) + 0.03 * numbers.normal());
             let rows = ranges(folder.path(), &input, options);
-            let wrong = rows
-                .iter()
-                .filter(|row| row["x"].is_f64() && !holds(row, &truth))
-                .count();
+            let found = || rows.iter().filter(|row| row["x"].is_f64());
+            all += found().count();
+            wrong += found().filter(|row| !holds(row, &truth)).count();
             let last = rows.last().unwrap();
-            assert!(wrong <= 12 && holds(last, &truth), "{truth:?} {options:?}: {wrong} rows, {last}");
+            assert!(holds(last, &truth) && off(last, &truth) < 0.6, "{truth:?} {options:?}: {last}");
         }
     }
+    // Two coordinates, each in its band in 95 of 100 rows.
+    assert!(wrong * 10 <= all, "{wrong} of {all} rows");
 }
 
 #[test]
@@ -313,93 +315,4 @@ fn a_height_that_no_option_says_is_found_or_asked_for() {
     std::fs::write(folder.path().join("walk.csv"), walk(&level, 0.6, &mut Vec::new())).unwrap();
     let message = refused(folder.path(), &["ranges", "walk.csv", "--anchors", "anchors.csv"], b"");
     assert!(message.contains("--height is needed"), "{message}");
-}
-
-/// Columns of what the target moved since the row before: it is followed between ranges, in rows without any too.
-#[test]
-fn odometry_carries_the_place_between_ranges() {
-    let folder = tempfile::tempdir().unwrap();
-    anchors(folder.path(), &RECTANGLE, 1.0, false);
-    let at = |row: usize| {
-        let angle = 0.9 * row as f64;
-        [6.0 + 2.0 * angle.cos(), 3.5 + 2.0 * (1.7 * angle).sin(), 0.0]
-    };
-    let mut numbers = Numbers(5);
-    let mut input = "time,n0,n1,n2,n3,dx,dy\n".to_owned();
-    for row in 0..120 {
-        let (here, before) = (at(row), at(row.saturating_sub(1)));
-        let cells: Vec<String> = (0..4)
-            .map(|i| {
-                let is_there = row < 4 || row % 5 == 0;
-                let range = distance(&RECTANGLE[i], &here) + 0.03 * numbers.normal();
-                if is_there { range.to_string() } else { String::new() }
-            })
-            .collect();
-        let moved = [here[0] - before[0], here[1] - before[1]];
-        input += &format!("{row},{},{},{}\n", cells.join(","), moved[0], moved[1]);
-    }
-    let options = ["--bias", "0", "--scale", "0"];
-    let rms = |rows: &[serde_json::Value]| {
-        let squares: f64 = rows
-            .iter()
-            .enumerate()
-            .map(|(row, one)| off(one, &at(row)).powi(2))
-            .sum();
-        (squares / rows.len() as f64).sqrt()
-    };
-    let with = ranges(folder.path(), &input, &[&options[..], &["--odometry", "dx,dy"]].concat());
-    assert!(with.iter().all(|row| row["x"].is_f64()), "{with:?}");
-    assert!(rms(&with) < 0.15, "{}", rms(&with));
-    // The same as reports of a long table.
-    let mut long = "time,anchor,value\n".to_owned();
-    for line in input.lines().skip(1) {
-        let cells: Vec<&str> = line.split(',').collect();
-        let names = ["n0", "n1", "n2", "n3", "dx", "dy"];
-        for (name, cell) in names.iter().zip(&cells[1..]).filter(|(_, cell)| !cell.is_empty()) {
-            long += &format!("{},{name},{cell}\n", cells[0]);
-        }
-    }
-    let words = [&options[..], &["--odometry", "dx,dy", "--by", "anchor"]].concat();
-    assert!(rms(&ranges(folder.path(), &long, &words)) < 0.15);
-    let words = ["ranges", "-", "--anchors", "anchors.csv", "--odometry"];
-    for (bad, why) in [
-        ("dx", "two columns"),
-        ("dx,dz", "no column `dz`"),
-        ("dx,n0", "no anchor"),
-    ] {
-        let error = refused(folder.path(), &[&words[..], &[bad]].concat(), input.as_bytes());
-        assert!(error.contains(why), "{bad}: {error}");
-    }
-}
-
-/// With bias and scale unknown, four anchors explain almost anything: if one is too long, the row must say that something is wrong, or hold the
-/// place. Calibrated ranges say nothing.
-#[test]
-fn an_anchor_that_bias_and_scale_take_up_is_doubtful() {
-    let folder = tempfile::tempdir().unwrap();
-    let places = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 3.0, 0.0], [0.0, 3.0, 0.0]];
-    anchors(folder.path(), &places, 1.0, false);
-    for (seed, truth) in [
-        (1, [1.4, 0.9, 0.0]),
-        (2, [2.6, 1.8, 0.0]),
-        (3, [1.1, 2.1, 0.0]),
-        (4, [2.9, 0.7, 0.0]),
-    ] {
-        for (bad, late) in [(0, 1.5), (2, 1.5), (1, 2.0)] {
-            let mut numbers = Numbers(seed);
-            let input = table(4, 100, |_, i| {
-                distance(&places[i], &truth) + 0.04 * numbers.normal() + if i == bad { late } else { 0.0 }
-            });
-            let rows = ranges(folder.path(), &input, &[]);
-            let silent = rows[40..]
-                .iter()
-                .filter(|row| row["events"].as_str().unwrap_or_default().is_empty() && !holds(row, &truth))
-                .count();
-            assert_eq!(silent, 0, "{truth:?}, anchor {bad}: {}", rows[99]);
-        }
-        let mut numbers = Numbers(10 + seed);
-        let good = table(4, 100, |_, i| distance(&places[i], &truth) + 0.04 * numbers.normal());
-        let rows = ranges(folder.path(), &good, &[]);
-        assert!(rows.iter().all(|row| row["events"] != "doubtful"), "{truth:?}");
-    }
 }

@@ -6,8 +6,8 @@
 //!     at each local maximum:     the most probable state by Gauss-Newton steps, for each noise; its covariance and evidence there
 //! keep:  the places whose evidence is not negligible beside the best, each as one hypothesis
 //! ```
-//! Fewer ranges than position, bias and error of scale have coordinates leave a curve of places: it is cut into pieces, each with an error of scale
-//! of its own, which is then not estimated ([`Normal::condition`]).
+//! Fewer ranges than position, bias and error of scale have coordinates leave a curve of places: it is cut into pieces by the error of scale, and each
+//! place of a piece into slices that are short enough for one linearisation.
 //!
 //! Anchors on a circle have a second place, the inverse of the first in that circle: its ranges differ by a factor only. Which of the two it is
 //! is decided by the prior of scale and bias alone, so both are kept while both are probable.
@@ -22,6 +22,11 @@ use super::settings::Known;
 /// Sets and places that become hypotheses at most, and by how many nats they may be worse than the best.
 const KEPT: usize = 6;
 const WORSE: f64 = 9.2;
+/// Of pieces and slices those that are not needed: the share of their probabilities.
+const NEGLIGIBLE: f64 = 1e-3;
+/// Slices of a place, and of a place of a piece, in its length's deviation.
+const SLICES: f64 = 4.0;
+const SLICES_OF_A_PIECE: f64 = 2.0;
 /// Prior probability that the range of an anchor does not depend on the distance beside that of an outlier.
 const BAD_ANCHOR: f64 = 0.01;
 /// Probability that an anchor is good before its first range, and after a first range that was an outlier.
@@ -79,6 +84,8 @@ pub(super) fn hypotheses(
         ranges as f64 * (1.0 - bad).ln() + apart
     };
     let likely = |one: &Found| one.log_evidence + penalty(one.without) + one.log_share();
+    // Fewer ranges than unknowns.
+    let is_short = |ranges: usize| ranges < known.axes + 2 && calibration[1].1 > 0.0;
     let mut found: Vec<Found> = Vec::new();
     let singles = if collected.len() > least {
         0..collected.len()
@@ -110,28 +117,39 @@ pub(super) fn hypotheses(
     let mut parts: Vec<(Search<'_>, Found, f64)> = Vec::new();
     for one in found {
         let ranges = left(one.without);
-        if ranges.len() < known.axes + 2 && calibration[1].1 > 0.0 {
-            for piece in pieces(&search, &one, &ranges, typical) {
+        if is_short(ranges.len()) {
+            for (piece, place, log_share) in pieces(&search, &one, &ranges, typical) {
                 let is_known = parts.iter().any(|(other, known, _)| {
-                    known.without == one.without
-                        && other.calibration == piece.0.calibration
-                        && is_same(&known.normal, &piece.1.normal)
+                    known.without == place.without
+                        && other.calibration == piece.calibration
+                        && is_same(&known.normal, &place.normal)
                 });
-                if !is_known {
-                    parts.push(piece);
+                if is_known {
+                    continue;
                 }
+                let slices = piece.sliced(&place, &ranges, typical, SLICES_OF_A_PIECE);
+                let slices = if slices.is_empty() { vec![place] } else { slices };
+                parts.extend(slices.into_iter().map(|slice| (piece, slice, log_share)));
             }
             continue;
         }
-        let slices = search.sliced(&one, &ranges, typical);
+        let slices = search.sliced(&one, &ranges, typical, SLICES);
         let slices = if slices.is_empty() { vec![one] } else { slices };
         parts.extend(slices.into_iter().map(|slice| (search, slice, 0.0)));
     }
-    let best = parts
-        .iter()
-        .map(|(_, one, log_share)| likely(one) + log_share)
-        .fold(f64::NEG_INFINITY, f64::max);
-    parts.retain(|(_, one, log_share)| likely(one) + log_share > best - WORSE);
+    let odds = |(_, one, log_share): &(Search<'_>, Found, f64)| likely(one) + log_share;
+    parts.sort_by(|a, b| odds(b).total_cmp(&odds(a)));
+    let best = parts.first().map_or(0.0, odds);
+    let weights: Vec<f64> = parts.iter().map(|part| (odds(part) - best).exp()).collect();
+    let total: f64 = weights.iter().sum();
+    let mut rest = total;
+    let counts = weights.iter().take_while(|weight| {
+        let is_needed = rest > NEGLIGIBLE * total;
+        rest -= *weight;
+        is_needed
+    });
+    let kept = counts.count();
+    parts.truncate(kept);
     let mut all = Vec::new();
     for (search, one, log_share) in &parts {
         let ranges = left(one.without);
@@ -144,7 +162,9 @@ pub(super) fn hypotheses(
                 continue;
             };
             let log_weight = log_evidence + penalty(one.without) + probability.ln() + log_share;
-            all.push(Hypothesis::new(log_weight, filters, weights, good.clone(), variant));
+            let mut hypothesis = Hypothesis::new(log_weight, filters, weights, good.clone(), variant);
+            hypothesis.is_cut = is_short(ranges.len());
+            all.push(hypothesis);
         }
     }
     all.retain(Hypothesis::is_finite);

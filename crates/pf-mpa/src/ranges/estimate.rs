@@ -10,8 +10,8 @@ use nalgebra::{Matrix3, Vector3};
 const SECOND: f64 = 0.01;
 /// A second place differs by more than this many deviations.
 const APART: f64 = 3.0;
-/// Squares of one and of two standard normal variables that are exceeded once in a hundred cases.
-const IMPROBABLE: [f64; 2] = [6.635, 9.210];
+/// Squares of one and of two standard normal variables that are exceeded once in a thousand cases: each row asks.
+const IMPROBABLE: [f64; 2] = [10.828, 13.816];
 /// A share of the prior's variance that the ranges must have taken off before they can contradict it.
 const TOLD: f64 = 0.05;
 /// Deviations to either side of a mean that hold 95 % of a normal law.
@@ -34,7 +34,7 @@ pub struct RangeEstimate {
     pub bands: [(f64, f64); 3],
     /// Number of places that explain the ranges, each by more than one in a hundred: 1 if the place is clear.
     pub places: usize,
-    /// Whether bias and scale are farther from zero than their priors allow in one case of a hundred: an anchor may be wrong whose error they
+    /// Whether bias and scale are farther from zero than their priors allow in one case of a thousand: an anchor may be wrong whose error they
     /// took up, as they can if there are few anchors, or the priors are too narrow.
     pub is_doubtful: bool,
     /// Common bias of the ranges.

@@ -47,7 +47,7 @@ use moved::Latest;
 use nalgebra::Vector3;
 use odds::{count_contradictions, drop_improbable, is_lost, merge_same, shares_of, uncertainty_of_noise};
 use rows::Collected;
-use settings::Known;
+use settings::{Known, NEGLIGIBLE_OF_LEVELS};
 use std::collections::BTreeMap;
 
 /// Ranges between two searches for hypotheses that have become the same.
@@ -121,7 +121,10 @@ impl RangeTracker {
             Travel::Bits(bits) => optimal_loading(1 << bits)?,
         };
         let places: Vec<Vector3<f64>> = anchors.values().copied().collect();
-        let known = settings.known(&places)?;
+        let mut known = settings.known(&places)?;
+        if travel != Travel::Full {
+            known.negligible = NEGLIGIBLE_OF_LEVELS;
+        }
         Ok(Self {
             names: anchors
                 .into_keys()
@@ -251,7 +254,7 @@ impl RangeTracker {
         self.hypotheses = hypotheses(&self.known, self.places.len(), self.calibration, &rows);
         self.tried = 0;
         let mut found = std::mem::take(&mut self.hypotheses);
-        self.evidence = drop_improbable(&mut found);
+        self.evidence = drop_improbable(&mut found, self.known.negligible);
         self.hypotheses = found;
         self.at = time;
     }
@@ -309,7 +312,7 @@ impl RangeTracker {
         // Evidence of ranges that every hypothesis can explain is evidence of little errors of the model. Only much of it decides.
         let is_undecided = next.iter().all(is_short);
         let mut best = f64::NEG_INFINITY;
-        next.retain_mut(|one| match one.update(known, anchor, &arrived, is_short(one)) {
+        next.retain_mut(|one| match one.update(known, anchor, &arrived, !one.is_cut && is_short(one)) {
             Ok(log_evidence) if is_undecided => {
                 best = best.max(one.recall(log_evidence));
                 one.is_finite()
@@ -331,7 +334,7 @@ impl RangeTracker {
         if next.is_empty() {
             return Err(failed.unwrap_or(Error::Impossible));
         }
-        let taken = drop_improbable(next);
+        let taken = drop_improbable(next, known.negligible);
         if self.pushed.is_multiple_of(COMPARED) {
             merge_same(next);
         }

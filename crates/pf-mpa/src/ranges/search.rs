@@ -157,8 +157,9 @@ impl Search<'_> {
         best
     }
 
-    /// Cuts a place whose law is too long for one linearisation into slices across its longest direction. Empty if it is not.
-    pub(super) fn sliced(&self, one: &Found, ranges: &[Collected], speed: f64) -> Vec<Found> {
+    /// Cuts a place whose law is too long for one linearisation into slices across its longest direction, at most `finest` in a deviation of it. Empty
+    /// if it is not.
+    pub(super) fn sliced(&self, one: &Found, ranges: &[Collected], speed: f64, finest: f64) -> Vec<Found> {
         let (n, axes) = (one.normal.mean.len(), self.axes());
         let positions = DMatrix::from_fn(axes, axes, |i, j| one.normal.covariance[i * n + j]);
         let eigen = positions.symmetric_eigen();
@@ -174,7 +175,7 @@ impl Search<'_> {
         if length < wanted {
             return Vec::new();
         }
-        let deviation = wanted.max(length / 4.0);
+        let deviation = wanted.max(length / finest);
         let mut direction = [0.0; 3];
         (0..axes).for_each(|i| direction[i] = eigen.eigenvectors[(i, longest)]);
         let middle: f64 = (0..axes).map(|i| direction[i] * one.normal.mean[i]).sum();

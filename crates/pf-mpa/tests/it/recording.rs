@@ -11,7 +11,7 @@ use rand_distr::StandardNormal;
 /// Ranges of a recording.
 const LENGTH: usize = 1000;
 /// Recordings of each kind.
-const RECORDINGS: u64 = 12;
+const RECORDINGS: u64 = 4;
 
 /// A made-up recording: anchors, ranges `(time, anchor, range)` and the true positions at the ranges' times.
 struct Recording {
