@@ -188,7 +188,7 @@ fn end(laws: &[(f64, f64, f64)], off: f64, target: f64) -> f64 {
             };
         }
         let error = below - target;
-        if error.abs() < CLOSE || !(low < high) {
+        if error.abs() < CLOSE || low >= high {
             break;
         }
         if error < 0.0 {

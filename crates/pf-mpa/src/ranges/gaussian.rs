@@ -97,8 +97,8 @@ impl Normal {
 
     pub(super) fn is_finite(&self) -> bool {
         let n = self.mean.len();
-        // `x - x` is zero for finite numbers only, and a sum needs no branch per number.
-        let rest = |values: &[f64]| values.iter().map(|x| x - x).sum::<f64>();
+        // `0 x` is zero for finite numbers only, and a sum needs no branch per number.
+        let rest = |values: &[f64]| values.iter().map(|x| 0.0 * x).sum::<f64>();
         rest(&self.mean) == 0.0
             && rest(&self.covariance) == 0.0
             && self.covariance.iter().step_by(n + 1).all(|variance| *variance >= 0.0)
