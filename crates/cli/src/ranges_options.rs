@@ -20,7 +20,8 @@ pub(crate) struct RangesOptions {
     /// of the distance of the anchors from their middle, and estimated from a hundredth of that on.
     #[arg(long, value_name = "DEVIATION")]
     pub(crate) noise: Option<f64>,
-    /// Standard deviation of the velocity along an axis, per second; a factor of four off is enough. Default: estimated.
+    /// Standard deviation of the velocity along an axis, per second; a factor of four off is enough. With `--odometry` that of its error. Default:
+    /// estimated.
     #[arg(long, value_name = "SPEED")]
     pub(crate) speed: Option<f64>,
     /// Standard deviation of the bias that all ranges share; `0` if there is none. Default: a fifth of the distance of the anchors from their
@@ -40,6 +41,10 @@ pub(crate) struct RangesOptions {
     /// The ranges of one time share an unknown offset: differences of times of arrival, times the speed of propagation.
     #[arg(long)]
     pub(crate) unknown_clock: bool,
+    /// Odometry: the columns of what the target moved since the row before, along the axes of the anchors' coordinates, as `dx,dy`. With `--by`
+    /// they are names in that column.
+    #[arg(long, value_name = "COLUMNS", value_delimiter = ',')]
+    pub(crate) odometry: Vec<String>,
     /// Correlation time of the velocity in seconds.
     #[arg(long, default_value_t = 6.0, value_name = "SECONDS")]
     pub(crate) persistence: f64,
@@ -49,6 +54,9 @@ pub(crate) struct RangesOptions {
     /// Seconds without a range after which the place is searched again.
     #[arg(long, default_value_t = 30.0, value_name = "SECONDS")]
     pub(crate) silence: f64,
+    /// Rows may be so much late, as `60s`: each waits that long, by the times of the rows, for earlier ones. Default: rows are in order.
+    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    pub(crate) late: Option<std::time::Duration>,
     /// Draw the estimates into this SVG file.
     #[arg(long, value_name = "FILE.svg")]
     pub(crate) plot: Option<PathBuf>,

@@ -1,6 +1,6 @@
 //! The height of a target of `ranges`, where no option says it.
 
-use super::ranges::Anchor;
+use super::anchors::Anchor;
 use super::rows::Instants;
 use crate::arguments::RangesOptions;
 use crate::error::Error;
@@ -28,7 +28,9 @@ pub(super) fn height_found(
             let name = &names[*sensor];
             let is_limit = instant.said.get(i).is_some_and(|said| said.limit.is_some());
             let is_known = anchors.iter().any(|(known, _)| known == name);
-            if let Some(range) = range.filter(|range| range.is_finite() && !is_limit && is_known) {
+            if let Some(range) = range
+                .filter(|range| range.is_finite() && (*range >= 0.0 || options.unknown_clock) && !is_limit && is_known)
+            {
                 ranges.push((instant.seconds, name.as_str(), range));
             }
         }

@@ -17,8 +17,10 @@
 //! | `fit` | the task `fit`: calibration |
 //! | `level` | the task `track`: a level |
 //! | `ranges` | the task `ranges`: a place |
+//! | `anchors`, `odometry`, `path` | the table of its anchors, the columns of what the target moved, the picture |
 //! | `height` | the height of its target |
 
+mod anchors;
 mod applied;
 mod centre;
 mod first;
@@ -29,6 +31,8 @@ mod hints;
 mod late;
 mod level;
 mod meaning;
+mod odometry;
+mod path;
 mod ranges;
 mod report;
 mod rhythm;
@@ -66,7 +70,12 @@ pub(crate) fn fit(options: &FitOptions) -> Result<Ending, Error> {
 pub(crate) fn ranges(options: &RangesOptions) -> Result<Ending, Error> {
     let kind = Kind {
         by: options.table.by.clone(),
+        late: options.late.map_or(0.0, |late| late.as_secs_f64()),
         ..Kind::default()
     };
-    ranges::run(options, Instants::open(&options.table, &kind)?)
+    let mut table = options.table.clone();
+    if table.by.is_none() && !table.columns.is_empty() {
+        table.columns.extend(options.odometry.iter().cloned());
+    }
+    ranges::run(options, Instants::open(&table, &kind)?)
 }

@@ -1,27 +1,24 @@
 //! Tracking of a position by distances to anchors.
 
+use super::anchors::read_anchors;
 use super::height::height_found;
+use super::odometry::Odometry;
+use super::path;
 use super::report::{first_cell, first_name, summarise};
-use super::rows::Instants;
+use super::rows::{Instant, Instants};
 use super::sensors;
 use crate::Ending;
-use crate::arguments::{RangesOptions, TableOptions, TrackOptions};
+use crate::arguments::{RangesOptions, TrackOptions};
 use crate::error::Error;
-use crate::input::Table;
 use crate::numbers::{number, short};
 use crate::output::{Cell, Shape, Sheet};
-use crate::plot::{Layer, Picture, Thinned};
+use crate::plot::Thinned;
 use crate::report::Report;
 use fewbits_pf_mpa::{Height, RangeEstimate, RangeSettings, RangeTracker, Travel};
-use fewbits_record::TimeBase;
-use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 
 /// A track that is lost once in so many rows is lost often.
 const OFTEN: u64 = 20;
-
-/// Name and place of an anchor.
-pub(super) type Anchor = (String, Vector3<f64>);
 
 #[derive(Serialize)]
 struct Summary {
@@ -33,6 +30,10 @@ struct Summary {
     searching: u64,
     /// Number of rows in which several places explain the ranges.
     ambiguous: u64,
+    /// Number of rows in which bias and scale contradict what is supposed of them.
+    doubtful: u64,
+    /// Number of ranges that were left out because they are negative.
+    negative: u64,
     losses: usize,
     anchors: Vec<AnchorSummary>,
     /// What the ranges suggest that no option says.
@@ -68,48 +69,15 @@ pub(super) fn options(track: &TrackOptions, anchors: &str) -> Result<RangesOptio
         scale: RangeSettings::default().scale,
         height: None,
         unknown_clock: false,
+        odometry: Vec::new(),
         persistence: track.persistence,
         outliers: track.outliers,
         silence: RangeSettings::default().silence,
+        late: track.late,
         plot: track.plot.clone(),
         json: track.json,
         output: track.output.clone(),
     })
-}
-
-/// Reads names and places: the first column, and the two or three after it.
-fn read_anchors(file: &str) -> Result<Vec<Anchor>, Error> {
-    let options = |columns: Vec<String>| TableOptions {
-        file: file.to_owned(),
-        columns,
-        ..TableOptions::default()
-    };
-    let names = Table::open(&options(Vec::new()))?.names;
-    let [name, places @ ..] = names.as_slice() else {
-        return Err(Error::empty(file, "columns"));
-    };
-    if !(2..=3).contains(&places.len()) {
-        let problem = format!("columns {}: three or four are expected, name, x, y and perhaps z", names.join(", "));
-        return Err(Error::content(file, problem));
-    }
-    let mut table = Table::open(&options(places.to_vec()))?.with_labels(name)?;
-    table.require_numbers()?;
-    let mut anchors: Vec<Anchor> = Vec::new();
-    while let Some((_, cells)) = table.next(TimeBase::Numbered)? {
-        let (label, row) = (table.label().to_owned(), table.row());
-        let is_whole = cells.iter().all(|cell| cell.is_some_and(f64::is_finite));
-        let at = |i: usize| cells.get(i).copied().flatten().unwrap_or(0.0);
-        let problem = if anchors.iter().any(|(known, _)| *known == label) {
-            format!("anchor `{label}` stands here twice")
-        } else if is_whole {
-            anchors.push((label, Vector3::new(at(0), at(1), at(2))));
-            continue;
-        } else {
-            format!("anchor `{label}` has no place: write {}", places.join(", "))
-        };
-        return Err(Error::content(file, format_args!("row {row}: {problem}")));
-    }
-    Ok(anchors)
 }
 
 fn settings(options: &RangesOptions) -> Result<RangeSettings, Error> {
@@ -192,7 +160,9 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
     }
     let mut tracker = RangeTracker::new(anchors.iter().cloned(), travel, settings).map_err(refused)?;
     let known = |name: &str| anchors.iter().position(|(known, _)| known == name);
-    if let Some(name) = instants.names.iter().find(|name| known(name).is_none()) {
+    let odometry = Odometry::new(options, &anchors, &instants)?;
+    let is_stray = |name: &&String| known(name).is_none() && odometry.axis(name).is_none();
+    if let Some(name) = instants.names.iter().find(is_stray) {
         return Err(unknown(instants.file(), name, file));
     }
     let axes = tracker.coordinates();
@@ -207,6 +177,8 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
         bits_per_range: 0.0,
         searching: 0,
         ambiguous: 0,
+        doubtful: 0,
+        negative: 0,
         losses: 0,
         hints: Vec::new(),
         anchors: anchors
@@ -218,24 +190,31 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
             })
             .collect(),
     };
-    let mut path = Thinned::new();
+    let mut places = Thinned::new();
     while let Some(instant) = instants.next()? {
         let (mut found, mut ranges, mut events) = (None, 0, "");
+        if let Some(by) = odometry.moved(&instant, &instants.names) {
+            let moved = tracker.moved(instant.seconds, &by);
+            found = moved.map_err(|source| refused_row(&instants, &instant, source))?;
+        }
         for (i, (sensor, range)) in instant.reports.iter().enumerate() {
             let is_limit = instant.said.get(i).is_some_and(|said| said.limit.is_some());
             let Some(range) = range.filter(|range| range.is_finite() && !is_limit) else {
                 continue;
             };
             let name = &instants.names[*sensor];
+            if odometry.axis(name).is_some() {
+                continue;
+            }
             let Some(anchor) = known(name) else {
                 return Err(unknown(instants.file(), name, file));
             };
+            if range < 0.0 && !options.unknown_clock {
+                summary.negative += 1;
+                continue;
+            }
             let pushed = tracker.push(instant.seconds, name, range);
-            let estimate = pushed.map_err(|source| Error::Row {
-                file: instants.file().to_owned(),
-                row: instant.row,
-                source: Box::new(source),
-            })?;
+            let estimate = pushed.map_err(|source| refused_row(&instants, &instant, source))?;
             if estimate.as_ref().is_some_and(|estimate| estimate.lost) {
                 events = "lost";
             }
@@ -249,11 +228,17 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
         match &found {
             Some(found) => {
                 let deviations = [0, 1].map(|i| found.covariance[(i, i)].sqrt());
-                path.push((found.position.xy(), deviations));
+                places.push((found.position.xy(), deviations));
                 if found.places > 1 {
                     summary.ambiguous += 1;
                     if events.is_empty() {
                         events = "several places";
+                    }
+                }
+                if found.is_doubtful {
+                    summary.doubtful += 1;
+                    if events.is_empty() {
+                        events = "doubtful";
                     }
                 }
             }
@@ -281,7 +266,7 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
         return Err(Error::empty(instants.file(), "rows"));
     }
     if let Some(file) = &options.plot {
-        picture(&anchors, path.points(), &summary).save(file)?;
+        path::picture(&anchors, places.points(), summary.ranges, summary.bits_per_range).save(file)?;
     }
     summary.hints = hints;
     if summary.losses as u64 > summary.rows / OFTEN && !options.unknown_clock {
@@ -309,6 +294,18 @@ fn lines(summary: &Summary, tracker: &RangeTracker, silence: f64) -> Vec<String>
             summary.ambiguous
         ));
     }
+    if summary.negative > 0 {
+        lines.push(format!(
+            "{} negative ranges were left out: they are no distances; differences of ranges need --unknown-clock",
+            summary.negative
+        ));
+    }
+    if summary.doubtful > summary.rows / OFTEN {
+        lines.push(format!(
+            "{} rows are doubtful: bias and scale are larger than --bias and --scale allow, as if an anchor's ranges or place were wrong; --bias 0 --scale 0 for calibrated ranges shows which",
+            summary.doubtful
+        ));
+    }
     lines.extend(summary.hints.iter().cloned());
     for anchor in &summary.anchors {
         if anchor.ranges == 0 {
@@ -320,56 +317,15 @@ fn lines(summary: &Summary, tracker: &RangeTracker, silence: f64) -> Vec<String>
     lines
 }
 
+fn refused_row(instants: &Instants, instant: &Instant, source: fewbits_pf_mpa::Error) -> Error {
+    Error::Row {
+        file: instants.file().to_owned(),
+        row: instant.row,
+        source: Box::new(source),
+    }
+}
+
 fn unknown(table: &str, name: &str, anchors: &str) -> Error {
     let mend = "add it there, choose columns with --columns, or name the column of anchors with --by";
     Error::content(table, format_args!("`{name}` is no anchor of {anchors}: {mend}"))
-}
-
-/// Corners of a drawn ellipse's cross, and how many there are along a path.
-const CROSSES: usize = 25;
-
-fn picture(anchors: &[Anchor], path: &[(Vector2<f64>, [f64; 2])], summary: &Summary) -> Picture {
-    let mut layers: Vec<Layer> = Vec::new();
-    for (place, deviations) in path.iter().step_by((path.len() / CROSSES).max(1)) {
-        for axis in 0..2 {
-            let mut ends = [(place.x, place.y); 2];
-            for (end, sign) in ends.iter_mut().zip([-1.0, 1.0]) {
-                let step = sign * super::report::BAND * deviations[axis];
-                *end = if axis == 0 {
-                    (end.0 + step, end.1)
-                } else {
-                    (end.0, end.1 + step)
-                };
-            }
-            layers.push(Layer::Line {
-                points: ends.to_vec(),
-                colour: 5,
-                name: String::new(),
-            });
-        }
-    }
-    layers.push(Layer::Line {
-        points: path.iter().map(|(place, _)| (place.x, place.y)).collect(),
-        colour: 0,
-        name: "path, crosses of 95 %".to_owned(),
-    });
-    layers.push(Layer::Dots {
-        points: anchors.iter().map(|(_, place)| (place.x, place.y)).collect(),
-        colour: 1,
-        name: "anchors".to_owned(),
-    });
-    for (name, place) in anchors {
-        layers.push(Layer::Label {
-            at: (place.x, place.y),
-            text: format!(" {name}\n"),
-        });
-    }
-    Picture {
-        title: format!("{} ranges of {:.2} bits", summary.ranges, summary.bits_per_range),
-        x: "x".to_owned(),
-        y: "y".to_owned(),
-        is_log: false,
-        is_map: true,
-        layers,
-    }
 }

@@ -315,7 +315,7 @@ impl Instants {
         if seconds < self.last && !self.late.is_waiting() {
             let row = self.table.row();
             let problem = format!(
-                "row {row}: time {time} is before that of the row above: sort the rows by time, or say how late rows may be, as --late 60s (`track`)"
+                "row {row}: time {time} is before that of the row above: sort the rows by time, or say how late rows may be, as --late 60s"
             );
             return Err(Error::content(self.file(), problem));
         }

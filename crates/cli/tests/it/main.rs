@@ -19,6 +19,7 @@ mod numbers;
 mod outputs;
 mod pages;
 mod ranges;
+mod ranges_tables;
 mod recordings;
 mod streams;
 mod tables;

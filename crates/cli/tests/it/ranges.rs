@@ -4,15 +4,15 @@ use crate::numbers::Numbers;
 use crate::{fewbits, good, refused, text};
 use std::path::Path;
 
-type Point = [f64; 3];
+pub(crate) type Point = [f64; 3];
 
-const RECTANGLE: [Point; 4] = [[0.0, 0.0, 0.0], [12.0, 0.0, 0.0], [12.0, 7.0, 0.0], [0.0, 7.0, 0.0]];
+pub(crate) const RECTANGLE: [Point; 4] = [[0.0, 0.0, 0.0], [12.0, 0.0, 0.0], [12.0, 7.0, 0.0], [0.0, 7.0, 0.0]];
 
-fn distance(a: &Point, b: &Point) -> f64 {
+pub(crate) fn distance(a: &Point, b: &Point) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
 }
 
-fn anchors(folder: &Path, places: &[Point], unit: f64, has_heights: bool) {
+pub(crate) fn anchors(folder: &Path, places: &[Point], unit: f64, has_heights: bool) {
     let mut table = if has_heights { "anchor,x,y,z\n" } else { "anchor,x,y\n" }.to_owned();
     for (i, place) in places.iter().enumerate() {
         table += &format!("n{i},{},{}", place[0] * unit, place[1] * unit);
@@ -26,7 +26,7 @@ fn anchors(folder: &Path, places: &[Point], unit: f64, has_heights: bool) {
 }
 
 /// Ranges of rows: what is read instead of the distance of each anchor. `NaN` is an empty cell.
-fn table(places: usize, rows: usize, mut range: impl FnMut(usize, usize) -> f64) -> String {
+pub(crate) fn table(places: usize, rows: usize, mut range: impl FnMut(usize, usize) -> f64) -> String {
     let names: Vec<String> = (0..places).map(|i| format!("n{i}")).collect();
     let mut table = format!("time,{}\n", names.join(","));
     for row in 0..rows {
@@ -39,7 +39,7 @@ fn table(places: usize, rows: usize, mut range: impl FnMut(usize, usize) -> f64)
     table
 }
 
-fn ranges(folder: &Path, table: &str, options: &[&str]) -> Vec<serde_json::Value> {
+pub(crate) fn ranges(folder: &Path, table: &str, options: &[&str]) -> Vec<serde_json::Value> {
     let words = [&["ranges", "-", "--anchors", "anchors.csv", "--json"], options].concat();
     let out = text(&good(folder, &words, table.as_bytes()));
     out.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
@@ -49,11 +49,11 @@ fn number(row: &serde_json::Value, name: &str) -> f64 {
     row[name].as_f64().unwrap_or(f64::NAN)
 }
 
-fn off(row: &serde_json::Value, truth: &Point) -> f64 {
+pub(crate) fn off(row: &serde_json::Value, truth: &Point) -> f64 {
     (number(row, "x") - truth[0]).hypot(number(row, "y") - truth[1])
 }
 
-fn holds(row: &serde_json::Value, truth: &Point) -> bool {
+pub(crate) fn holds(row: &serde_json::Value, truth: &Point) -> bool {
     ["x", "y"].iter().zip(truth).all(|(axis, truth)| {
         (number(row, &format!("{axis}_low"))..=number(row, &format!("{axis}_high"))).contains(truth)
     })
@@ -64,6 +64,7 @@ fn holds(row: &serde_json::Value, truth: &Point) -> bool {
 fn a_rectangle_of_anchors_has_no_ghost() {
     let folder = tempfile::tempdir().unwrap();
     anchors(folder.path(), &RECTANGLE, 1.0, false);
+    let (mut wrong, mut all) = (0, 0);
     for (seed, truth) in [
         (1, [4.0, 2.5, 0.0]),
         (2, [10.9, 1.2, 0.0]),
@@ -74,14 +75,15 @@ fn a_rectangle_of_anchors_has_no_ghost() {
             let mut numbers = Numbers(seed);
             let input = table(4, 60, |_, i| distance(&RECTANGLE[i], &truth) + 0.03 * numbers.normal());
             let rows = ranges(folder.path(), &input, options);
-            let wrong = rows
-                .iter()
-                .filter(|row| row["x"].is_f64() && !holds(row, &truth))
-                .count();
+            let found = || rows.iter().filter(|row| row["x"].is_f64());
+            all += found().count();
+            wrong += found().filter(|row| !holds(row, &truth)).count();
             let last = rows.last().unwrap();
-            assert!(wrong <= 12 && holds(last, &truth), "{truth:?} {options:?}: {wrong} rows, {last}");
+            assert!(holds(last, &truth) && off(last, &truth) < 0.6, "{truth:?} {options:?}: {last}");
         }
     }
+    // Two coordinates, each in its band in 95 of 100 rows.
+    assert!(wrong * 10 <= all, "{wrong} of {all} rows");
 }
 
 #[test]

@@ -6,8 +6,8 @@
 //!     at each local maximum:     the most probable state by Gauss-Newton steps, for each noise; its covariance and evidence there
 //! keep:  the places whose evidence is not negligible beside the best, each as one hypothesis
 //! ```
-//! Fewer ranges than position, bias and error of scale have coordinates leave a curve of places: it is cut into pieces, each with an error of scale
-//! of its own, which is then not estimated ([`Normal::condition`]).
+//! Fewer ranges than position, bias and error of scale have coordinates leave a curve of places: it is cut into pieces by the error of scale, and each
+//! place of a piece into slices that are short enough for one linearisation.
 //!
 //! Anchors on a circle have a second place, the inverse of the first in that circle: its ranges differ by a factor only. Which of the two it is
 //! is decided by the prior of scale and bias alone, so both are kept while both are probable.
@@ -21,7 +21,12 @@ use super::settings::Known;
 
 /// Sets and places that become hypotheses at most, and by how many nats they may be worse than the best.
 const KEPT: usize = 6;
-const WORSE: f64 = 14.0;
+const WORSE: f64 = 9.2;
+/// Of pieces and slices those that are not needed: the share of their probabilities.
+const NEGLIGIBLE: f64 = 1e-3;
+/// Slices of a place, and of a place of a piece, in its length's deviation.
+const SLICES: f64 = 4.0;
+const SLICES_OF_A_PIECE: f64 = 2.0;
 /// Prior probability that the range of an anchor does not depend on the distance beside that of an outlier.
 const BAD_ANCHOR: f64 = 0.01;
 /// Probability that an anchor is good before its first range, and after a first range that was an outlier.
@@ -69,14 +74,18 @@ pub(super) fn hypotheses(
     };
     // An outlier, or an anchor whose ranges say nothing, is as probable as `bad`, and its range as `1 / stray`.
     let bad = known.outliers + BAD_ANCHOR;
-    let penalty = |without: Option<usize>, ranges: usize| {
-        ranges as f64 * (1.0 - bad).ln()
-            + if without.is_some() {
-                (bad / known.stray).ln()
-            } else {
-                0.0
-            }
+    let penalty = |without: Option<usize>| {
+        let ranges = collected.len() - usize::from(without.is_some());
+        let apart = if without.is_some() {
+            (bad / known.stray).ln()
+        } else {
+            0.0
+        };
+        ranges as f64 * (1.0 - bad).ln() + apart
     };
+    let likely = |one: &Found| one.log_evidence + penalty(one.without) + one.log_share();
+    // Fewer ranges than unknowns.
+    let is_short = |ranges: usize| ranges < known.axes + 2 && calibration[1].1 > 0.0;
     let mut found: Vec<Found> = Vec::new();
     let singles = if collected.len() > least {
         0..collected.len()
@@ -86,10 +95,9 @@ pub(super) fn hypotheses(
     for without in std::iter::once(None).chain(singles.map(Some)) {
         let ranges = left(without);
         for start in search.maxima(&ranges) {
-            let Some(mut best) = search.best(&start, &ranges, without, typical) else {
+            let Some(best) = search.best(&start, &ranges, without, typical) else {
                 continue;
             };
-            best.log_evidence += penalty(without, ranges.len());
             let twin = found
                 .iter_mut()
                 .find(|other| other.without == without && is_same(&other.normal, &best.normal));
@@ -100,32 +108,48 @@ pub(super) fn hypotheses(
             }
         }
     }
-    found.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-    let Some(best) = found.first().map(|best| best.log_evidence) else {
+    found.sort_by(|a, b| likely(b).total_cmp(&likely(a)));
+    let Some(best) = found.first().map(likely) else {
         return Vec::new();
     };
-    found.retain(|one| one.log_evidence > best - WORSE);
+    found.retain(|one| likely(one) > best - WORSE);
     found.truncate(KEPT);
     let mut parts: Vec<(Search<'_>, Found, f64)> = Vec::new();
     for one in found {
         let ranges = left(one.without);
-        if ranges.len() < known.axes + 2 && calibration[1].1 > 0.0 {
-            for piece in pieces(&search, &one, &ranges, typical) {
+        if is_short(ranges.len()) {
+            for (piece, place, log_share) in pieces(&search, &one, &ranges, typical) {
                 let is_known = parts.iter().any(|(other, known, _)| {
-                    known.without == one.without
-                        && other.calibration == piece.0.calibration
-                        && is_same(&known.normal, &piece.1.normal)
+                    known.without == place.without
+                        && other.calibration == piece.calibration
+                        && is_same(&known.normal, &place.normal)
                 });
-                if !is_known {
-                    parts.push(piece);
+                if is_known {
+                    continue;
                 }
+                let slices = piece.sliced(&place, &ranges, typical, SLICES_OF_A_PIECE);
+                let slices = if slices.is_empty() { vec![place] } else { slices };
+                parts.extend(slices.into_iter().map(|slice| (piece, slice, log_share)));
             }
             continue;
         }
-        let slices = search.sliced(&one, &ranges, typical);
+        let slices = search.sliced(&one, &ranges, typical, SLICES);
         let slices = if slices.is_empty() { vec![one] } else { slices };
         parts.extend(slices.into_iter().map(|slice| (search, slice, 0.0)));
     }
+    let odds = |(_, one, log_share): &(Search<'_>, Found, f64)| likely(one) + log_share;
+    parts.sort_by(|a, b| odds(b).total_cmp(&odds(a)));
+    let best = parts.first().map_or(0.0, odds);
+    let weights: Vec<f64> = parts.iter().map(|part| (odds(part) - best).exp()).collect();
+    let total: f64 = weights.iter().sum();
+    let mut rest = total;
+    let counts = weights.iter().take_while(|weight| {
+        let is_needed = rest > NEGLIGIBLE * total;
+        rest -= *weight;
+        is_needed
+    });
+    let kept = counts.count();
+    parts.truncate(kept);
     let mut all = Vec::new();
     for (search, one, log_share) in &parts {
         let ranges = left(one.without);
@@ -137,8 +161,10 @@ pub(super) fn hypotheses(
             let Some((filters, weights, log_evidence)) = search.bank(one, &ranges, *own) else {
                 continue;
             };
-            let log_weight = log_evidence + penalty(one.without, ranges.len()) + probability.ln() + log_share;
-            all.push(Hypothesis::new(log_weight, filters, weights, good.clone(), variant));
+            let log_weight = log_evidence + penalty(one.without) + probability.ln() + log_share;
+            let mut hypothesis = Hypothesis::new(log_weight, filters, weights, good.clone(), variant);
+            hypothesis.is_cut = is_short(ranges.len());
+            all.push(hypothesis);
         }
     }
     all.retain(Hypothesis::is_finite);
@@ -146,28 +172,28 @@ pub(super) fn hypotheses(
     all
 }
 
-/// A place cut by the error of scale: what each piece is searched with, the place, and `ln` of the piece's share.
+/// A place cut by the error of scale: what each piece is searched with, the places, and `ln` of the piece's share. A curve may have two places
+/// for one error of scale, or none.
 fn pieces<'a>(search: &Search<'a>, one: &Found, ranges: &[Collected], typical: f64) -> Vec<(Search<'a>, Found, f64)> {
     let [bias, (middle, variance)] = search.calibration;
     let deviation = variance.sqrt();
-    let mut found = Vec::new();
-    for sign in [1.0, -1.0] {
-        let mut from = one.normal.mean.clone();
-        for (off, share) in PIECES {
-            // The middle belongs to the first direction; each piece starts where its neighbour ended.
-            if off * sign < 0.0 || off == 0.0 && sign < 0.0 {
-                continue;
-            }
-            let scale = (middle + off * deviation, (PIECE * deviation).powi(2));
-            let piece = Search {
-                calibration: [bias, scale],
-                ..*search
-            };
-            if let Some(place) = piece.best(&from, ranges, one.without, typical) {
-                from.clone_from(&place.normal.mean);
-                found.push((piece, place, share.ln()));
+    let mut found: Vec<(Search<'a>, Found, f64)> = Vec::new();
+    for (off, share) in PIECES {
+        let scale = (middle + off * deviation, (PIECE * deviation).powi(2));
+        let piece = Search {
+            calibration: [bias, scale],
+            ..*search
+        };
+        let mut own: Vec<Found> = Vec::new();
+        let starts = piece.maxima(ranges).into_iter().map(|start| start.to_vec());
+        for start in starts.chain([one.normal.mean.clone()]) {
+            if let Some(place) = piece.best(&start, ranges, one.without, typical)
+                && !own.iter().any(|known| is_same(&known.normal, &place.normal))
+            {
+                own.push(place);
             }
         }
+        found.extend(own.into_iter().map(|place| (piece, place, share.ln())));
     }
     found
 }

@@ -12,10 +12,6 @@ const NOISE_CHANGES: f64 = 0.1 * SPEED_CHANGES;
 const MIXED: u32 = 5;
 /// Probability per range of an anchor that it starts, or ceases, to send ranges that do not depend on the distance.
 const ANCHOR_CHANGES: f64 = 1e-3;
-/// A share of its neighbours below this does not change the moments of a filter.
-const NEGLIGIBLE: f64 = 1e-6;
-/// A filter of less weight than this is left out, until changes from its neighbours reach it again.
-const LEFT_OUT: f64 = 1e-6;
 /// Share of a range's score that stays in the sum of an anchor's scores.
 const SCORE_KEPT: f64 = 0.9;
 /// Share of a range's evidence that stays in the recent evidence, and by how many nats that of two hypotheses may differ without deciding.
@@ -31,6 +27,8 @@ pub(super) struct Hypothesis {
     pub(super) weights: Vec<f64>,
     /// Per anchor, the probability that its ranges depend on the distance.
     pub(super) good: Vec<f64>,
+    /// Whether it is a piece of a curve of places: short enough that the error of scale is estimated though the ranges alone do not determine it.
+    pub(super) is_cut: bool,
     /// Which deviation of single anchors' biases it has.
     pub(super) variant: usize,
     /// Probability that a range is no outlier, averaged over the latest ranges.
@@ -55,6 +53,7 @@ impl Clone for Hypothesis {
             weights: self.weights.clone(),
             good: self.good.clone(),
             variant: self.variant,
+            is_cut: self.is_cut,
             agreement: self.agreement,
             contradicted: self.contradicted,
             recent: self.recent,
@@ -71,6 +70,7 @@ impl Clone for Hypothesis {
         self.weights.clone_from(&from.weights);
         self.good.clone_from(&from.good);
         self.variant = from.variant;
+        self.is_cut = from.is_cut;
         self.agreement = from.agreement;
         self.contradicted = from.contradicted;
         (self.recent, self.behind) = (from.recent, from.behind);
@@ -103,6 +103,7 @@ impl Hypothesis {
             weights,
             good,
             variant,
+            is_cut: false,
             agreement: 1.0,
             contradicted: 0,
             recent: 0.0,
@@ -120,22 +121,34 @@ impl Hypothesis {
         if self.ranges.is_multiple_of(MIXED) {
             let changes = |a_range: f64| -(f64::from(MIXED) * (-a_range).ln_1p()).exp_m1();
             for noise in 0..noises {
-                self.mix((0..speeds).map(|speed| speed * noises + noise), changes(SPEED_CHANGES));
+                self.mix((0..speeds).map(|speed| speed * noises + noise), changes(SPEED_CHANGES), known.negligible);
             }
             for speed in 0..speeds {
-                self.mix(speed * noises..(speed + 1) * noises, changes(NOISE_CHANGES));
+                self.mix(speed * noises..(speed + 1) * noises, changes(NOISE_CHANGES), known.negligible);
             }
         }
+        self.carry(known, step, &[0.0; 3]);
+    }
+
+    /// Moves all filters on, and by a displacement.
+    pub(super) fn carry(&mut self, known: &Known, step: &Step, by: &[f64; 3]) {
+        let noises = known.noises.len();
         for (i, filter) in self.filters.iter_mut().enumerate() {
             if self.weights[i] > 0.0 {
                 let speed = known.speeds[i / noises];
                 filter.predict(step, speed * speed);
+                filter
+                    .mean
+                    .iter_mut()
+                    .take(known.axes)
+                    .zip(by)
+                    .for_each(|(x, by)| *x += by);
             }
         }
     }
 
     /// With probability `changes`, a filter becomes one of its two neighbours in a row of filters.
-    fn mix(&mut self, row: impl Iterator<Item = usize>, changes: f64) {
+    fn mix(&mut self, row: impl Iterator<Item = usize>, changes: f64, negligible: f64) {
         let row: Vec<usize> = row.collect();
         if row.len() < 2 || row.iter().all(|i| self.weights[*i] == 0.0) {
             return;
@@ -154,7 +167,7 @@ impl Hypothesis {
             };
             let added: f64 = arriving().map(|(weight, _)| weight).sum();
             let total = staying + added;
-            let moments = if total < LEFT_OUT || added <= NEGLIGIBLE * staying {
+            let moments = if total < negligible || added <= negligible * staying {
                 None
             } else {
                 let own = (staying > 0.0).then_some((staying, *i));
@@ -288,7 +301,7 @@ impl Hypothesis {
         }
         self.weights.iter_mut().for_each(|weight| {
             *weight /= total;
-            if *weight < LEFT_OUT {
+            if *weight < known.negligible {
                 *weight = 0.0;
             }
         });
@@ -314,6 +327,32 @@ impl Hypothesis {
         }
         let variance = 2.0 / (9.0 * count);
         ((sum / count).cbrt() - (1.0 - variance)) / variance.sqrt()
+    }
+
+    /// The common moments of some coordinates: mean, and covariance row by row.
+    pub(super) fn marginal<const N: usize>(&self, coordinates: &[usize; N]) -> ([f64; N], [[f64; N]; N]) {
+        let (mut mean, mut covariance) = ([0.0; N], [[0.0; N]; N]);
+        let total: f64 = self.parts().map(|(weight, _)| weight).sum();
+        for (weight, part) in self.parts() {
+            let share = weight / total;
+            for (sum, i) in mean.iter_mut().zip(coordinates) {
+                *sum += share * part.mean[*i];
+            }
+        }
+        for (weight, part) in self.parts() {
+            let (share, n) = (weight / total, part.mean.len());
+            let mut off = [0.0; N];
+            for ((off, mean), i) in off.iter_mut().zip(&mean).zip(coordinates) {
+                *off = part.mean[*i] - mean;
+            }
+            for (a, i) in coordinates.iter().enumerate() {
+                let row = &part.covariance[i * n..(i + 1) * n];
+                for (b, j) in coordinates.iter().enumerate() {
+                    covariance[a][b] += share * (row[*j] + off[a] * off[b]);
+                }
+            }
+        }
+        (mean, covariance)
     }
 
     /// The filters' common moments.

@@ -1,7 +1,6 @@
 //! What all hypotheses together say.
 
 use super::bank::Hypothesis;
-use super::gaussian::{Normal, merged};
 use super::odds::shares_of;
 use super::settings::Known;
 use fewbits_numerics::normal;
@@ -11,11 +10,16 @@ use nalgebra::{Matrix3, Vector3};
 const SECOND: f64 = 0.01;
 /// A second place differs by more than this many deviations.
 const APART: f64 = 3.0;
+/// Squares of one and of two standard normal variables that are exceeded once in a thousand cases: each row asks.
+const IMPROBABLE: [f64; 2] = [10.828, 13.816];
+/// A share of the prior's variance that the ranges must have taken off before they can contradict it.
+const TOLD: f64 = 0.05;
 /// Deviations to either side of a mean that hold 95 % of a normal law.
 const BAND: f64 = 1.959_963_984_540_054;
 
-/// Halvings of the interval in which the end of a band lies.
-const HALVINGS: usize = 24;
+/// Steps to the end of a band at most, and by how much the probability beside it may be off.
+const STEPS: usize = 60;
+const CLOSE: f64 = 1e-7;
 
 /// The estimate after one range. Lengths are in the unit of the anchors' coordinates.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +34,9 @@ pub struct RangeEstimate {
     pub bands: [(f64, f64); 3],
     /// Number of places that explain the ranges, each by more than one in a hundred: 1 if the place is clear.
     pub places: usize,
+    /// Whether bias and scale are farther from zero than their priors allow in one case of a thousand: an anchor may be wrong whose error they
+    /// took up, as they can if there are few anchors, or the priors are too narrow.
+    pub is_doubtful: bool,
     /// Common bias of the ranges.
     pub bias: f64,
     /// Error of scale: ranges are `1 + scale` times the distance, plus the bias.
@@ -52,33 +59,52 @@ impl RangeEstimate {
     }
 }
 
+/// Position (the third coordinate only if it is estimated), bias and scale by one hypothesis.
+struct Part {
+    share: f64,
+    mean: [f64; 5],
+    covariance: [[f64; 5]; 5],
+}
+
+/// Places of bias and scale in a [`Part`].
+const BIAS: usize = 3;
+const SCALE: usize = 4;
+
 /// The estimate of all hypotheses together; `None` without any.
 pub(super) fn of(known: &Known, hypotheses: &[Hypothesis], lost: bool) -> Option<RangeEstimate> {
     let (axes, noises) = (known.axes, known.noises.len());
     let shares = shares_of(hypotheses);
-    let parts: Vec<(f64, Normal)> = shares
+    let parts: Vec<Part> = shares
         .iter()
         .zip(hypotheses)
-        .filter_map(|(share, one)| Some((*share, part(&one.moments()?))))
+        .map(|(share, one)| {
+            let (mean, covariance) = one.marginal(&[0, 1, 2, 2 * axes, 2 * axes + 1]);
+            Part {
+                share: *share,
+                mean,
+                covariance,
+            }
+        })
         .collect();
-    let all = merged(parts.iter().map(|(share, normal)| (*share, normal)))?;
-    let n = all.mean.len();
+    let best = parts.iter().max_by(|a, b| a.share.total_cmp(&b.share))?;
+    let mean = |i: usize| parts.iter().map(|one| one.share * one.mean[i]).sum::<f64>();
     let mut position = Vector3::new(0.0, 0.0, known.level);
+    (0..axes).for_each(|i| position[i] = mean(i));
     let mut covariance = Matrix3::zeros();
     let mut bands = [(known.level, known.level); 3];
     for i in 0..axes {
-        position[i] = all.mean[i];
-        (0..axes).for_each(|j| covariance[(i, j)] = all.covariance[i * n + j]);
-        let laws: Vec<(f64, f64, f64)> = parts
-            .iter()
-            .map(|(share, one)| (*share, one.mean[i], one.variance(i).sqrt()))
-            .collect();
-        bands[i] = band(&laws);
+        for j in 0..axes {
+            let one = |one: &Part| {
+                one.share * (one.covariance[i][j] + (one.mean[i] - position[i]) * (one.mean[j] - position[j]))
+            };
+            covariance[(i, j)] = parts.iter().map(one).sum();
+        }
+        let law = |one: &Part| (one.share, one.mean[i], one.covariance[i][i].sqrt());
+        bands[i] = band(&parts.iter().map(law).collect::<Vec<_>>());
     }
-    let best = parts.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     let others = parts
         .iter()
-        .filter(|(share, one)| *share > SECOND && are_apart(one, &best.1, axes))
+        .filter(|one| one.share > SECOND && are_apart(one, best, axes))
         .count();
     let (mut noise, mut speed) = (0.0, 0.0);
     for (share, one) in shares.iter().zip(hypotheses) {
@@ -92,58 +118,90 @@ pub(super) fn of(known: &Known, hypotheses: &[Hypothesis], lost: bool) -> Option
         covariance,
         bands,
         places: 1 + others,
-        bias: all.mean[axes],
-        scale: all.mean[axes + 1],
+        is_doubtful: is_doubtful(known, &parts),
+        bias: mean(BIAS),
+        scale: mean(SCALE),
         noise: noise.exp(),
         speed: speed.exp(),
         lost,
     })
 }
 
-/// Position, bias and scale of a law.
-fn part(one: &Normal) -> Normal {
-    let (n, axes) = (one.mean.len(), one.axes);
-    let kept: Vec<usize> = (0..axes).chain([one.bias(), one.scale()]).collect();
-    Normal {
-        mean: kept.iter().map(|i| one.mean[*i]).collect(),
-        covariance: kept
-            .iter()
-            .flat_map(|i| kept.iter().map(move |j| one.covariance[i * n + j]))
-            .collect(),
-        axes,
+/// Whether the estimates of bias and scale contradict their priors. Before the ranges, the mean of an estimate has the prior's variance less the
+/// estimate's own.
+fn is_doubtful(known: &Known, parts: &[Part]) -> bool {
+    if known.clock.is_some() {
+        return false;
+    }
+    let priors = [(BIAS, known.bias), (SCALE, known.scale)];
+    let asked: Vec<(usize, f64)> = priors.into_iter().filter(|(_, prior)| *prior > 0.0).collect();
+    let mean = |i: usize| parts.iter().map(|one| one.share * one.mean[i]).sum::<f64>();
+    // In deviations of the priors.
+    let covariance = |(i, of_i): (usize, f64), (j, of_j): (usize, f64)| {
+        let one = |one: &Part| one.share * (one.covariance[i][j] + (one.mean[i] - mean(i)) * (one.mean[j] - mean(j)));
+        parts.iter().map(one).sum::<f64>() / (of_i * of_j)
+    };
+    let off = |(i, of): (usize, f64)| mean(i) / of;
+    match asked.as_slice() {
+        [one] => off(*one).powi(2) > IMPROBABLE[0] * (1.0 - covariance(*one, *one)),
+        [a, b] => {
+            let left = [1.0 - covariance(*a, *a), -covariance(*a, *b), 1.0 - covariance(*b, *b)];
+            let determinant = left[0] * left[2] - left[1] * left[1];
+            let (x, y) = (off(*a), off(*b));
+            let square = x * x * left[2] - 2.0 * x * y * left[1] + y * y * left[0];
+            // Ranges that say nothing leave nothing to contradict.
+            left[0] > TOLD && left[2] > TOLD && determinant > TOLD * TOLD && square > IMPROBABLE[1] * determinant
+        }
+        _ => false,
     }
 }
 
-fn are_apart(a: &Normal, b: &Normal, axes: usize) -> bool {
-    (0..axes).any(|i| (a.mean[i] - b.mean[i]).abs() > APART * (a.variance(i).sqrt() + b.variance(i).sqrt()))
+fn are_apart(a: &Part, b: &Part, axes: usize) -> bool {
+    let deviation = |one: &Part, i: usize| one.covariance[i][i].sqrt();
+    (0..axes).any(|i| (a.mean[i] - b.mean[i]).abs() > APART * (deviation(a, i) + deviation(b, i)))
 }
 
 /// The interval that holds 95 % of a mixture of `(share, mean, deviation)`, with 2.5 % on either side.
 fn band(laws: &[(f64, f64, f64)]) -> (f64, f64) {
-    let low = laws.iter().map(|(_, mean, deviation)| mean - BAND * deviation);
-    let high = laws.iter().map(|(_, mean, deviation)| mean + BAND * deviation);
-    let (low_most, low_least) = (low.clone().fold(f64::INFINITY, f64::min), low.fold(f64::NEG_INFINITY, f64::max));
-    let (high_least, high_most) = (high.clone().fold(f64::INFINITY, f64::min), high.fold(f64::NEG_INFINITY, f64::max));
-    let below = |x: f64| -> f64 {
-        laws.iter()
-            .map(|(share, mean, deviation)| {
-                let z = (x - mean) / deviation;
-                share * if z.is_nan() { 0.5 } else { normal::cdf(z) }
-            })
-            .sum()
-    };
-    let bisect = |target: f64, mut from: f64, mut to: f64| {
-        if laws.len() > 1 {
-            for _ in 0..HALVINGS {
-                let middle = 0.5 * (from + to);
-                if below(middle) < target {
-                    from = middle
-                } else {
-                    to = middle
-                }
-            }
+    (end(laws, -BAND, 0.025), end(laws, BAND, 0.975))
+}
+
+/// Where the probability below reaches `target`, by Newton's steps between ends that hold it. `off`: the place for one law, in deviations.
+fn end(laws: &[(f64, f64, f64)], off: f64, target: f64) -> f64 {
+    let ends = laws.iter().map(|(_, mean, deviation)| mean + off * deviation);
+    let (mut low, mut high) =
+        ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), end| (low.min(end), high.max(end)));
+    if laws.len() == 1 {
+        return low;
+    }
+    let mut x = 0.5 * (low + high);
+    for _ in 0..STEPS {
+        let (mut below, mut density) = (0.0, 0.0);
+        for (share, mean, deviation) in laws {
+            let z = (x - mean) / deviation;
+            // A law without a deviation, at its mean.
+            below += share * if z.is_nan() { 0.5 } else { normal::cdf(z) };
+            density += if *deviation > 0.0 {
+                share * normal::pdf(z) / deviation
+            } else {
+                0.0
+            };
         }
-        0.5 * (from + to)
-    };
-    (bisect(0.025, low_most, low_least), bisect(0.975, high_least, high_most))
+        let error = below - target;
+        if error.abs() < CLOSE || low >= high {
+            break;
+        }
+        if error < 0.0 {
+            low = x
+        } else {
+            high = x
+        }
+        let step = x - error / density;
+        x = if step > low && step < high {
+            step
+        } else {
+            0.5 * (low + high)
+        };
+    }
+    x
 }

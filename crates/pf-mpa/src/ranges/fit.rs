@@ -39,76 +39,82 @@ impl Search<'_> {
 
 /// Gauss-Newton steps at most.
 const STEPS: usize = 30;
-/// Most coordinates: three positions, bias and scale.
-const MOST: usize = 5;
+/// A step that promises to lower the cost by less than this share is not taken.
+const SETTLED: f64 = 1e-7;
 
-type Vector = [f64; MOST];
-type Matrix = [[f64; MOST]; MOST];
+/// `S` coordinates: positions, bias and scale.
+type Vector<const S: usize> = [f64; S];
+type Matrix<const S: usize> = [[f64; S]; S];
 
 /// Cost, information and downhill gradient at a point.
-struct Local {
+struct Local<const S: usize> {
     cost: f64,
-    information: Matrix,
-    gradient: Vector,
+    information: Matrix<S>,
+    gradient: Vector<S>,
+}
+
+impl<const S: usize> Local<S> {
+    /// Adds what is off by `off` and has this slope and variance. Only the lower triangle of the information is filled.
+    #[inline]
+    fn add(&mut self, off: f64, slope: &Vector<S>, variance: f64) {
+        let weight = 1.0 / variance;
+        self.cost += off * off * weight;
+        for i in 0..S {
+            let scaled = slope[i] * weight;
+            self.gradient[i] += scaled * off;
+            for j in 0..=i {
+                self.information[i][j] += scaled * slope[j];
+            }
+        }
+    }
 }
 
 /// What is minimised.
-struct Problem<'a> {
+struct Problem<'a, const S: usize> {
     search: &'a Search<'a>,
     rows: &'a Rows<'a>,
     /// Variance of each range's error, the bias of its anchor included.
     variances: Vec<f64>,
-    middle: Vector,
-    prior: Vector,
-    /// Number of coordinates.
-    size: usize,
+    middle: Vector<S>,
+    prior: Vector<S>,
 }
 
-impl Problem<'_> {
-    fn axes(&self) -> usize {
-        self.size - 2
-    }
+impl<const S: usize> Problem<'_, S> {
+    /// Number of positions.
+    const AXES: usize = S - 2;
 
     /// The expected range and its gradient.
-    fn expected(&self, x: &Vector, one: &Collected) -> (f64, Vector) {
-        let axes = self.axes();
+    #[inline]
+    fn expected(&self, x: &Vector<S>, one: &Collected) -> (f64, Vector<S>) {
+        let axes = Self::AXES;
         let d = self.search.distance(x, one);
         let factor = 1.0 + x[axes + 1];
-        let mut gradient = [0.0; MOST];
+        let mut gradient = [0.0; S];
         if d > 0.0 {
-            (0..axes).for_each(|i| gradient[i] = factor * (x[i] - one.place[i]) / d);
+            let slope = factor / d;
+            (0..axes).for_each(|i| gradient[i] = slope * (x[i] - one.place[i]));
         }
         (gradient[axes], gradient[axes + 1]) = (1.0, d);
         (factor * d + x[axes], gradient)
     }
 
-    fn at(&self, x: &Vector) -> Local {
+    fn at(&self, x: &Vector<S>) -> Local<S> {
         let mut found = Local {
             cost: 0.0,
-            information: [[0.0; MOST]; MOST],
-            gradient: [0.0; MOST],
-        };
-        let mut add = |off: f64, slope: &Vector, variance: f64| {
-            found.cost += off * off / variance;
-            for i in 0..self.size {
-                found.gradient[i] += slope[i] * off / variance;
-                for j in 0..=i {
-                    found.information[i][j] += slope[i] * slope[j] / variance;
-                }
-            }
+            information: [[0.0; S]; S],
+            gradient: [0.0; S],
         };
         for (one, variance) in self.rows.ranges.iter().zip(&self.variances) {
             let (expected, slope) = self.expected(x, one);
-            add(one.range - expected, &slope, *variance);
+            found.add(one.range - expected, &slope, *variance);
         }
         if let Some(slice) = self.rows.slice {
-            let along: f64 = (0..self.axes()).map(|i| slice.direction[i] * x[i]).sum();
-            let mut slope = [0.0; MOST];
-            slope[..3].copy_from_slice(&slice.direction);
-            (self.axes()..MOST).for_each(|i| slope[i] = 0.0);
-            add(slice.middle - along, &slope, slice.deviation * slice.deviation);
+            let along: f64 = (0..Self::AXES).map(|i| slice.direction[i] * x[i]).sum();
+            let mut slope = [0.0; S];
+            slope[..Self::AXES].copy_from_slice(&slice.direction[..Self::AXES]);
+            found.add(slice.middle - along, &slope, slice.deviation * slice.deviation);
         }
-        for i in 0..self.size {
+        for i in 0..S {
             if self.prior[i] > 0.0 {
                 let off = self.middle[i] - x[i];
                 found.cost += off * off / self.prior[i];
@@ -117,7 +123,7 @@ impl Problem<'_> {
             } else {
                 // A coordinate that is known.
                 found.gradient[i] = 0.0;
-                for j in 0..self.size {
+                for j in 0..S {
                     found.information[i.max(j)][i.min(j)] = 0.0;
                 }
                 found.information[i][i] = 1.0;
@@ -128,15 +134,15 @@ impl Problem<'_> {
 }
 
 /// The lower triangular root; `None` if the matrix is not positive definite.
-fn root(matrix: &Matrix, size: usize) -> Option<Matrix> {
-    let mut root = [[0.0; MOST]; MOST];
-    for j in 0..size {
+fn root<const S: usize>(matrix: &Matrix<S>) -> Option<Matrix<S>> {
+    let mut root = [[0.0; S]; S];
+    for j in 0..S {
         let left = matrix[j][j] - root[j][..j].iter().map(|x| x * x).sum::<f64>();
         if left <= 0.0 || !left.is_finite() {
             return None;
         }
         root[j][j] = left.sqrt();
-        for i in j + 1..size {
+        for i in j + 1..S {
             let known: f64 = (0..j).map(|k| root[i][k] * root[j][k]).sum();
             root[i][j] = (matrix[i][j] - known) / root[j][j];
         }
@@ -144,14 +150,14 @@ fn root(matrix: &Matrix, size: usize) -> Option<Matrix> {
     Some(root)
 }
 
-fn solve(root: &Matrix, right: &Vector, size: usize) -> Vector {
+fn solve<const S: usize>(root: &Matrix<S>, right: &Vector<S>) -> Vector<S> {
     let mut x = *right;
-    for i in 0..size {
+    for i in 0..S {
         let known: f64 = (0..i).map(|k| root[i][k] * x[k]).sum();
         x[i] = (x[i] - known) / root[i][i];
     }
-    for i in (0..size).rev() {
-        let known: f64 = (i + 1..size).map(|k| root[k][i] * x[k]).sum();
+    for i in (0..S).rev() {
+        let known: f64 = (i + 1..S).map(|k| root[k][i] * x[k]).sum();
         x[i] = (x[i] - known) / root[i][i];
     }
     x
@@ -160,9 +166,22 @@ fn solve(root: &Matrix, right: &Vector, size: usize) -> Vector {
 /// The most probable state near a start, its covariance there, and the evidence, in a slice of the positions if there is one. `None` if the
 /// information is singular.
 pub(super) fn fit(search: &Search<'_>, start: &[f64], rows: &Rows<'_>, speed: f64, own: f64) -> Option<(Normal, f64)> {
-    let axes = search.known.axes;
-    let size = axes + 2;
-    let (mut middle, mut prior) = ([0.0; MOST], [0.0; MOST]);
+    if search.axes() == 2 {
+        fit_of::<4>(search, start, rows, speed, own)
+    } else {
+        fit_of::<5>(search, start, rows, speed, own)
+    }
+}
+
+fn fit_of<const S: usize>(
+    search: &Search<'_>,
+    start: &[f64],
+    rows: &Rows<'_>,
+    speed: f64,
+    own: f64,
+) -> Option<(Normal, f64)> {
+    let axes = S - 2;
+    let (mut middle, mut prior) = ([0.0; S], [0.0; S]);
     for i in 0..axes {
         (middle[i], prior[i]) = (search.known.middle[i], search.known.spreads[i].powi(2));
     }
@@ -175,37 +194,42 @@ pub(super) fn fit(search: &Search<'_>, start: &[f64], rows: &Rows<'_>, speed: f6
         variances: rows.deviations.iter().map(|one| one * one + own * own).collect(),
         middle,
         prior,
-        size,
     };
     let mut x = middle;
     x[..axes].copy_from_slice(start.get(..axes)?);
     let mut local = problem.at(&x);
+    let mut factor = root(&local.information)?;
+    let mut step = solve(&factor, &local.gradient);
+    let promise = |step: &Vector<S>, local: &Local<S>| -> f64 { (0..S).map(|i| step[i] * local.gradient[i]).sum() };
     for _ in 0..STEPS {
-        let whole = solve(&root(&local.information, size)?, &local.gradient, size);
+        if promise(&step, &local) < SETTLED * (1.0 + local.cost) {
+            break;
+        }
         let (mut has_moved, mut share) = (false, 1.0);
         while share > 1e-4 {
             let mut next = x;
-            (0..size).for_each(|i| next[i] += share * whole[i]);
+            (0..S).for_each(|i| next[i] += share * step[i]);
             let found = problem.at(&next);
             if found.cost < local.cost {
-                has_moved = local.cost - found.cost > 1e-7 * (1.0 + found.cost);
+                has_moved = local.cost - found.cost > SETTLED * (1.0 + found.cost);
                 (x, local) = (next, found);
                 break;
             }
             share *= 0.5;
         }
+        factor = root(&local.information)?;
+        step = solve(&factor, &local.gradient);
         if !has_moved {
             break;
         }
     }
-    let factor = root(&local.information, size)?;
-    let step = solve(&factor, &local.gradient, size);
     // Cost at the minimum of the linearised problem.
-    let cost = local.cost - (0..size).map(|i| step[i] * local.gradient[i]).sum::<f64>();
+    let cost = local.cost - promise(&step, &local);
     let mut log_determinant: f64 = problem.variances.iter().map(|variance| variance.ln()).sum();
     log_determinant += rows.slice.map_or(0.0, |slice| 2.0 * slice.deviation.ln());
-    for i in 0..size {
-        log_determinant += 2.0 * factor[i][i].ln() + if prior[i] > 0.0 { prior[i].ln() } else { 0.0 };
+    for i in 0..S {
+        let known = if prior[i] > 0.0 { prior[i] } else { 1.0 };
+        log_determinant += (factor[i][i] * factor[i][i] * known).ln();
     }
     let count = (rows.ranges.len() + usize::from(rows.slice.is_some())) as f64;
     let log_evidence = -0.5 * (cost + log_determinant + count * std::f64::consts::TAU.ln());
@@ -214,24 +238,26 @@ pub(super) fn fit(search: &Search<'_>, start: &[f64], rows: &Rows<'_>, speed: f6
 }
 
 /// The law of the whole state.
-fn law(problem: &Problem<'_>, x: &Vector, factor: &Matrix, speed: f64, own: f64) -> Normal {
-    let (size, axes) = (problem.size, problem.axes());
+fn law<const S: usize>(problem: &Problem<'_, S>, x: &Vector<S>, factor: &Matrix<S>, speed: f64, own: f64) -> Normal {
+    let axes = S - 2;
     let n = 2 * axes + 2 + if own > 0.0 { problem.search.anchors } else { 0 };
-    let mut inverse = [[0.0; MOST]; MOST];
-    for (i, column) in inverse.iter_mut().enumerate().take(size) {
-        let mut unit = [0.0; MOST];
+    let mut inverse = [[0.0; S]; S];
+    for (i, column) in inverse.iter_mut().enumerate() {
+        let mut unit = [0.0; S];
         unit[i] = f64::from(u8::from(problem.prior[i] > 0.0));
-        *column = solve(factor, &unit, size);
-        (0..size)
-            .filter(|j| problem.prior[*j] == 0.0)
-            .for_each(|j| column[j] = 0.0);
+        *column = solve(factor, &unit);
+        for (x, prior) in column.iter_mut().zip(&problem.prior) {
+            if *prior == 0.0 {
+                *x = 0.0;
+            }
+        }
     }
     // Where a coordinate of the problem is in the state.
     let place = |i: usize| if i < axes { i } else { axes + i };
     let (mut mean, mut covariance) = (vec![0.0; n], vec![0.0; n * n]);
-    for i in 0..size {
+    for i in 0..S {
         mean[place(i)] = x[i];
-        for j in 0..size {
+        for j in 0..S {
             covariance[place(i) * n + place(j)] = 0.5 * (inverse[i][j] + inverse[j][i]);
         }
     }
@@ -240,7 +266,7 @@ fn law(problem: &Problem<'_>, x: &Vector, factor: &Matrix, speed: f64, own: f64)
         let first = 2 * axes + 2;
         (first..n).for_each(|i| covariance[i * n + i] = own * own);
         // Given the state, the bias of an anchor is a share of what its range is off.
-        let shares: Vec<(usize, f64, Vector)> = problem
+        let shares: Vec<(usize, f64, Vector<S>)> = problem
             .rows
             .ranges
             .iter()
@@ -253,14 +279,14 @@ fn law(problem: &Problem<'_>, x: &Vector, factor: &Matrix, speed: f64, own: f64)
             })
             .collect();
         for (at, share, slope) in &shares {
-            let mut cross = [0.0; MOST];
-            for i in 0..size {
-                cross[i] = -share * (0..size).map(|j| inverse[i][j] * slope[j]).sum::<f64>();
+            let mut cross = [0.0; S];
+            for i in 0..S {
+                cross[i] = -share * (0..S).map(|j| inverse[i][j] * slope[j]).sum::<f64>();
                 covariance[at * n + place(i)] = cross[i];
                 covariance[place(i) * n + at] = cross[i];
             }
             for (other, other_share, other_slope) in &shares {
-                let common: f64 = -other_share * (0..size).map(|i| cross[i] * other_slope[i]).sum::<f64>();
+                let common: f64 = -other_share * (0..S).map(|i| cross[i] * other_slope[i]).sum::<f64>();
                 let alone = if at == other { own * own * (1.0 - share) } else { 0.0 };
                 covariance[at * n + other] = common + alone;
             }

@@ -97,31 +97,42 @@ impl Normal {
 
     pub(super) fn is_finite(&self) -> bool {
         let n = self.mean.len();
-        self.mean.iter().chain(&self.covariance).all(|x| x.is_finite())
-            && (0..n).all(|i| self.covariance[i * n + i] >= 0.0)
+        // `0 x` is zero for finite numbers only, and a sum needs no branch per number.
+        let rest = |values: &[f64]| values.iter().map(|x| 0.0 * x).sum::<f64>();
+        rest(&self.mean) == 0.0
+            && rest(&self.covariance) == 0.0
+            && self.covariance.iter().step_by(n + 1).all(|variance| *variance >= 0.0)
     }
 
     /// Moves the state by a step whose velocities have this variance.
     pub(super) fn predict(&mut self, step: &Step, speed_variance: f64) {
-        let n = self.mean.len();
-        for axis in 0..self.axes {
-            let (p, v) = (axis, self.axes + axis);
-            self.mean[p] += step.reach * self.mean[v];
-            self.mean[v] *= step.kept;
-            for j in 0..n {
-                self.covariance[p * n + j] += step.reach * self.covariance[v * n + j];
-                self.covariance[v * n + j] *= step.kept;
+        let (n, axes, bias) = (self.mean.len(), self.axes, self.bias());
+        for p in 0..axes {
+            self.mean[p] += step.reach * self.mean[axes + p];
+            self.mean[axes + p] *= step.kept;
+        }
+        let (positions, rest) = self.covariance.split_at_mut(axes * n);
+        for (position, velocity) in positions.chunks_exact_mut(n).zip(rest.chunks_exact_mut(n)) {
+            for (p, v) in position.iter_mut().zip(velocity) {
+                *p += step.reach * *v;
+                *v *= step.kept;
             }
-            for i in 0..n {
-                self.covariance[i * n + p] += step.reach * self.covariance[i * n + v];
-                self.covariance[i * n + v] *= step.kept;
+        }
+        for row in self.covariance.chunks_exact_mut(n) {
+            let (positions, rest) = row.split_at_mut(axes);
+            for (p, v) in positions.iter_mut().zip(rest) {
+                *p += step.reach * *v;
+                *v *= step.kept;
             }
+        }
+        let cross = step.cross * speed_variance;
+        for p in 0..axes {
+            let v = axes + p;
             self.covariance[p * n + p] += step.position * speed_variance;
             self.covariance[v * n + v] += step.velocity * speed_variance;
-            self.covariance[p * n + v] += step.cross * speed_variance;
-            self.covariance[v * n + p] += step.cross * speed_variance;
+            self.covariance[p * n + v] += cross;
+            self.covariance[v * n + p] += cross;
         }
-        let bias = self.bias();
         self.covariance[bias * n + bias] += step.drift;
     }
 
@@ -140,12 +151,15 @@ impl Normal {
     pub(super) fn range(&self, place: &[f64; 3], above: f64, anchor: usize, out: &mut Predicted) {
         let (n, axes) = (self.mean.len(), self.axes);
         let (bias, scale) = (self.bias(), self.scale());
+        // A known height: the third coordinates differ by `above`.
+        let mut at = [self.mean[0], self.mean[1], place[2] - above];
+        if axes == 3 {
+            at[2] = self.mean[2];
+        }
         let distance = |point: &[f64; 3]| {
-            let squares: f64 = (0..axes).map(|i| (point[i] - place[i]).powi(2)).sum();
-            (squares + above * above).sqrt()
+            let off = [point[0] - place[0], point[1] - place[1], point[2] - place[2]];
+            (off[0] * off[0] + off[1] * off[1] + off[2] * off[2]).sqrt()
         };
-        let mut at = [0.0; 3];
-        at[..axes].copy_from_slice(&self.mean[..axes]);
         let centre = distance(&at);
         let spread: f64 = (0..axes).map(|i| self.variance(i)).sum();
         // Gradient of the distance by the position, its mean, and the variance that the gradient does not explain.
@@ -185,12 +199,19 @@ impl Normal {
         out.mean = factor * mean + self.mean[bias];
         let own = self.own(anchor);
         out.mean += own.map_or(0.0, |own| self.mean[own]);
+        // The covariance is symmetric: a sum of rows, by what each coordinate does to the range.
         out.cross.clear();
-        for i in 0..n {
-            let row = &self.covariance[i * n..(i + 1) * n];
-            let position: f64 = (0..axes).map(|j| row[j] * gradient[j]).sum();
-            out.cross
-                .push(factor * position + mean * row[scale] + row[bias] + own.map_or(0.0, |own| row[own]));
+        let row = |i: usize| &self.covariance[i * n..(i + 1) * n];
+        let (first, second) = (factor * gradient[0], factor * gradient[1]);
+        let pairs = row(0).iter().zip(row(1)).zip(row(bias).iter().zip(row(scale)));
+        out.cross
+            .extend(pairs.map(|((x, y), (bias, scale))| first * x + second * y + (bias + mean * scale)));
+        let more = [
+            (axes == 3).then_some((2, factor * gradient[2])),
+            own.map(|own| (own, 1.0)),
+        ];
+        for (i, slope) in more.into_iter().flatten() {
+            out.cross.iter_mut().zip(row(i)).for_each(|(sum, x)| *sum += slope * x);
         }
         let positions: f64 = (0..axes).map(|i| out.cross[i] * gradient[i]).sum();
         let linear =
@@ -231,21 +252,35 @@ impl Normal {
             return;
         }
         let (n, scale) = (self.mean.len(), self.scale());
-        let held = (self.mean[scale], self.variance(scale));
         let shift = (mean - predicted.mean) / predicted.variance;
         let shrink = (predicted.variance - variance) / (predicted.variance * predicted.variance);
-        for i in 0..n {
-            self.mean[i] += predicted.cross[i] * shift;
-            let row = predicted.cross[i] * shrink;
-            for j in 0..n {
-                self.covariance[i * n + j] -= row * predicted.cross[j];
+        let held = (self.mean[scale], self.variance(scale));
+        for (mean, cross) in self.mean.iter_mut().zip(&predicted.cross) {
+            *mean += cross * shift;
+        }
+        for (row, cross) in self.covariance.chunks_exact_mut(n).zip(&predicted.cross) {
+            let gain = cross * shrink;
+            for (x, other) in row.iter_mut().zip(&predicted.cross) {
+                *x -= gain * other;
             }
         }
         if holds_scale {
+            if shrink < 0.0 {
+                // A variance that grows, as that of a doubtful range does: what is held has no part in it, or its covariances would outgrow its
+                // variance.
+                let back = predicted.cross[scale] * shrink;
+                for (i, cross) in predicted.cross.iter().enumerate() {
+                    self.covariance[scale * n + i] += back * cross;
+                    self.covariance[i * n + scale] = self.covariance[scale * n + i];
+                }
+            }
             (self.mean[scale], self.covariance[scale * n + scale]) = held;
         }
         // Rounding must not leave a negative variance of a coordinate that is known.
-        (0..n).for_each(|i| self.covariance[i * n + i] = self.covariance[i * n + i].max(0.0));
+        self.covariance
+            .iter_mut()
+            .step_by(n + 1)
+            .for_each(|variance| *variance = variance.max(0.0));
     }
 }
 
@@ -265,13 +300,17 @@ pub(super) fn merged<'a>(parts: impl Iterator<Item = (f64, &'a Normal)> + Clone)
     let (mut covariance, mut off) = (vec![0.0; n * n], vec![0.0; n]);
     for (weight, part) in parts {
         let share = weight / total;
-        off.iter_mut()
-            .enumerate()
-            .for_each(|(i, off)| *off = part.mean[i] - mean[i]);
-        for i in 0..n {
-            let row = share * off[i];
-            for j in 0..n {
-                covariance[i * n + j] += share * part.covariance[i * n + j] + row * off[j];
+        for ((off, x), mean) in off.iter_mut().zip(&part.mean).zip(&mean) {
+            *off = x - mean;
+        }
+        for ((sums, row), off_of_row) in covariance
+            .chunks_exact_mut(n)
+            .zip(part.covariance.chunks_exact(n))
+            .zip(&off)
+        {
+            let between = share * off_of_row;
+            for ((sum, x), off) in sums.iter_mut().zip(row).zip(&off) {
+                *sum += share * x + between * off;
             }
         }
     }
@@ -280,4 +319,39 @@ pub(super) fn merged<'a>(parts: impl Iterator<Item = (f64, &'a Normal)> + Clone)
         covariance,
         axes: first.axes,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A range of which it is doubtful whether it depends on the distance raises the variance. Covariances with an error of scale that is held
+    /// must not outgrow its variance then.
+    #[test]
+    fn a_held_scale_keeps_the_covariance_positive() {
+        let n = 6;
+        let mut normal = Normal {
+            mean: vec![3.0, 4.0, 0.0, 0.0, 0.0, 0.0],
+            covariance: vec![0.0; n * n],
+            axes: 2,
+        };
+        for (i, variance) in [1.0, 1.0, 0.1, 0.1, 0.5, 0.01].into_iter().enumerate() {
+            normal.covariance[i * n + i] = variance;
+        }
+        let mut predicted = Predicted::default();
+        for k in 0..60_i32 {
+            let place = [10.0 * f64::from(k % 3), 7.0 * f64::from(k % 2), 0.0];
+            normal.range(&place, 0.0, 0, &mut predicted);
+            let factor = if k % 4 == 3 { 3.0 } else { 0.3 };
+            normal.condition(&predicted, predicted.mean, factor * predicted.variance, true);
+            let scale = normal.scale();
+            for i in (0..n).filter(|i| *i != scale) {
+                let cross = normal.covariance[i * n + scale];
+                let both = normal.variance(i) * normal.variance(scale);
+                assert!(cross * cross <= both * (1.0 + 1e-9), "range {k}, coordinate {i}: {cross} of {both}");
+            }
+            let positions = normal.covariance[1].powi(2);
+            assert!(positions <= normal.variance(0) * normal.variance(1) * (1.0 + 1e-9), "range {k}");
+        }
+    }
 }

@@ -9,6 +9,7 @@
 //! tracking     each range is sent as the level of its innovation, or in full; with probability `outliers` it is unrelated to the state
 //! anchors      each has a probability that its ranges depend on the distance, since one that contradicts the others does so again
 //! speed, noise a bank of filters in each hypothesis, weighted by evidence; works with 1 bit too
+//! odometry     a displacement moves all places; speed and its filters are then those of its error
 //! output       the moments, and the bands, of all hypotheses together
 //! lost         if most ranges of all hypotheses are outliers, or levels agree too long; or after `silence` seconds without a range
 //! ```
@@ -21,6 +22,7 @@ mod estimate;
 mod fit;
 mod gaussian;
 mod heights;
+mod moved;
 mod odds;
 mod rows;
 mod search;
@@ -41,10 +43,11 @@ use fewbits_core::RangeNoise;
 use fewbits_numerics::error::{finite, refuse, within};
 use fit::Calibration;
 use gaussian::Step;
+use moved::Latest;
 use nalgebra::Vector3;
 use odds::{count_contradictions, drop_improbable, is_lost, merge_same, shares_of, uncertainty_of_noise};
 use rows::Collected;
-use settings::Known;
+use settings::{Known, NEGLIGIBLE_OF_LEVELS};
 use std::collections::BTreeMap;
 
 /// Ranges between two searches for hypotheses that have become the same.
@@ -69,6 +72,8 @@ pub struct RangeTracker {
     names: BTreeMap<String, usize>,
     places: Vec<[f64; 3]>,
     travel: Travel,
+    /// Deviations from the expected range to the outermost edge between levels; 0 for ranges in full.
+    loading: f64,
     known: Known,
     hypotheses: Vec<Hypothesis>,
     /// A buffer: the next hypotheses while they are computed.
@@ -76,11 +81,13 @@ pub struct RangeTracker {
     /// When each anchor last sent a range.
     heard: Vec<f64>,
     /// The latest range in full of each anchor.
-    collected: BTreeMap<usize, (f64, f64)>,
+    collected: BTreeMap<usize, Latest>,
     /// Ranges since acquisition began.
     tried: usize,
     calibration: Calibration,
     last: f64,
+    /// The time that the hypotheses are about.
+    at: f64,
     pushed: usize,
     bits: usize,
     losses: usize,
@@ -109,8 +116,15 @@ impl RangeTracker {
                 return refuse("travel", format!("{bits} bits"), "ranges in full, since their clock is unknown");
             }
         }
+        let loading = match travel {
+            Travel::Full => 0.0,
+            Travel::Bits(bits) => optimal_loading(1 << bits)?,
+        };
         let places: Vec<Vector3<f64>> = anchors.values().copied().collect();
-        let known = settings.known(&places)?;
+        let mut known = settings.known(&places)?;
+        if travel != Travel::Full {
+            known.negligible = NEGLIGIBLE_OF_LEVELS;
+        }
         Ok(Self {
             names: anchors
                 .into_keys()
@@ -119,6 +133,7 @@ impl RangeTracker {
                 .collect(),
             places: places.iter().map(|place| [place.x, place.y, place.z]).collect(),
             travel,
+            loading,
             hypotheses: Vec::new(),
             next: Vec::new(),
             heard: vec![f64::NEG_INFINITY; places.len()],
@@ -127,6 +142,7 @@ impl RangeTracker {
             calibration: [(0.0, known.bias * known.bias), (0.0, known.scale * known.scale)],
             known,
             last: f64::NEG_INFINITY,
+            at: f64::NEG_INFINITY,
             pushed: 0,
             bits: 0,
             losses: 0,
@@ -148,9 +164,7 @@ impl RangeTracker {
     pub fn push(&mut self, time: f64, anchor: &str, range: f64) -> Result<Option<RangeEstimate>, Error> {
         finite("range", range)?;
         finite("range in 32 bits", f64::from(range as f32))?;
-        if finite("time", time)? < self.last {
-            return refuse("time", time, format!("{} or later", self.last));
-        }
+        self.check_time(time)?;
         let anchor = self.number(anchor)?;
         let (is_new, elapsed) = (time > self.last, time - self.last);
         if elapsed > self.known.silence {
@@ -167,7 +181,7 @@ impl RangeTracker {
         }
         let mut next = std::mem::take(&mut self.next);
         next.clone_from(&self.hypotheses);
-        let lost = match self.track(&mut next, if is_new { elapsed } else { 0.0 }, is_new, anchor, range) {
+        let lost = match self.track(&mut next, time - self.at, is_new, anchor, range) {
             Ok(taken) => {
                 self.evidence += taken;
                 is_lost(&next, self.travel != Travel::Full)
@@ -176,7 +190,7 @@ impl RangeTracker {
             Err(Error::Impossible) => true,
             Err(error) => return Err(error),
         };
-        self.last = time;
+        (self.last, self.at) = (time, time);
         self.bits += match self.travel {
             Travel::Full => FULL_BITS,
             Travel::Bits(bits) => bits as usize,
@@ -185,7 +199,8 @@ impl RangeTracker {
             if self.known.clock.is_some() && is_new {
                 self.collected.clear();
             }
-            self.collected.insert(anchor, (time, f64::from(range as f32)));
+            self.collected
+                .insert(anchor, Latest::new(time, f64::from(range as f32)));
         }
         if !next.is_empty() {
             std::mem::swap(&mut self.hypotheses, &mut next);
@@ -210,16 +225,17 @@ impl RangeTracker {
             self.collected.clear();
             if !self.hypotheses.is_empty() {
                 let mut next = self.hypotheses.clone();
-                if let Ok(taken) = self.track(&mut next, time - self.last, true, anchor, range) {
+                if let Ok(taken) = self.track(&mut next, time - self.at, true, anchor, range) {
                     self.hypotheses = next;
+                    self.at = time;
                     self.evidence += taken;
                 }
                 return;
             }
         }
         let silence = self.known.silence;
-        self.collected.retain(|_, (then, _)| time - *then <= silence);
-        self.collected.insert(anchor, (time, range));
+        self.collected.retain(|_, latest| time - latest.time <= silence);
+        self.collected.insert(anchor, Latest::new(time, range));
         self.tried += 1;
         // An anchor that never answers is not waited for.
         let is_enough = self.collected.len() >= self.needed();
@@ -233,18 +249,14 @@ impl RangeTracker {
         let rows: Vec<Collected> = self
             .collected
             .iter()
-            .map(|(anchor, (then, range))| Collected {
-                anchor: *anchor,
-                place: self.places[*anchor],
-                range: *range,
-                age: time - then,
-            })
+            .map(|(anchor, latest)| latest.seen_at(time, *anchor, &self.places[*anchor]))
             .collect();
         self.hypotheses = hypotheses(&self.known, self.places.len(), self.calibration, &rows);
         self.tried = 0;
         let mut found = std::mem::take(&mut self.hypotheses);
-        self.evidence = drop_improbable(&mut found);
+        self.evidence = drop_improbable(&mut found, self.known.negligible);
         self.hypotheses = found;
+        self.at = time;
     }
 
     /// Moves hypotheses on and updates them with a range. Returns `ln` of the evidence that was taken off their weights.
@@ -285,14 +297,10 @@ impl RangeTracker {
                     0.0
                 };
                 let expected = Gaussian::scalar(mean + aside, variance)?;
-                let reference = RangeReference::about(&expected, optimal_loading(levels)?);
+                let reference = RangeReference::about(&expected, self.loading);
                 let scheme = QuantizedRange::new(levels, RangeNoise::constant(known.noises[0])?)?;
                 let level = scheme.level(range, &reference)?.0;
-                Arrived::Level {
-                    level,
-                    levels,
-                    reference,
-                }
+                Arrived::level(level, levels, &reference)?
             }
         };
         let mut failed = None;
@@ -304,7 +312,7 @@ impl RangeTracker {
         // Evidence of ranges that every hypothesis can explain is evidence of little errors of the model. Only much of it decides.
         let is_undecided = next.iter().all(is_short);
         let mut best = f64::NEG_INFINITY;
-        next.retain_mut(|one| match one.update(known, anchor, &arrived, is_short(one)) {
+        next.retain_mut(|one| match one.update(known, anchor, &arrived, !one.is_cut && is_short(one)) {
             Ok(log_evidence) if is_undecided => {
                 best = best.max(one.recall(log_evidence));
                 one.is_finite()
@@ -326,7 +334,7 @@ impl RangeTracker {
         if next.is_empty() {
             return Err(failed.unwrap_or(Error::Impossible));
         }
-        let taken = drop_improbable(next);
+        let taken = drop_improbable(next, known.negligible);
         if self.pushed.is_multiple_of(COMPARED) {
             merge_same(next);
         }

@@ -4,8 +4,8 @@ use super::acquisition::is_same;
 use super::bank::Hypothesis;
 use super::gaussian::Normal;
 
-/// A hypothesis is dropped if its probability is less than this share of the best one's.
-const DROPPED: f64 = 1e-5;
+/// A hypothesis whose probability is less than this share of the best one's is dropped in any case.
+const LEAST: f64 = 1e-5;
 
 /// The track is lost if fewer than this share of the latest ranges agree.
 const AGREEMENT: f64 = 0.35;
@@ -29,12 +29,12 @@ pub(super) fn shares_of(hypotheses: &[Hypothesis]) -> Vec<f64> {
 }
 
 /// Drops hypotheses that are improbable beside the best one. Returns what was taken off the `ln` of all weights: only differences matter.
-pub(super) fn drop_improbable(hypotheses: &mut Vec<Hypothesis>) -> f64 {
+pub(super) fn drop_improbable(hypotheses: &mut Vec<Hypothesis>, negligible: f64) -> f64 {
     let best = hypotheses
         .iter()
         .map(Hypothesis::log_share)
         .fold(f64::NEG_INFINITY, f64::max);
-    hypotheses.retain(|one| one.log_share() - best > DROPPED.ln());
+    hypotheses.retain(|one| one.log_share() - best > negligible.max(LEAST).ln());
     if !best.is_finite() {
         return 0.0;
     }
@@ -44,6 +44,9 @@ pub(super) fn drop_improbable(hypotheses: &mut Vec<Hypothesis>) -> f64 {
 
 /// Of hypotheses about the same place with the same model, keeps the most probable, with the probability of all.
 pub(super) fn merge_same(hypotheses: &mut Vec<Hypothesis>) {
+    if hypotheses.len() < 2 {
+        return;
+    }
     hypotheses.sort_by(|a, b| b.log_share().total_cmp(&a.log_share()));
     let mut kept: Vec<(Hypothesis, Option<Normal>)> = Vec::new();
     for one in hypotheses.drain(..) {

@@ -9,6 +9,12 @@ use nalgebra::DMatrix;
 const NODES: [(i32, f64); 2] = [(12, 0.25), (6, 0.4)];
 /// Local maxima of the grid that are refined, for each set of anchors.
 const MAXIMA: usize = 4;
+/// By how many nats one may be worse than the best: the grid's noise is large, with that of the ranges it is worse by more.
+const NEGLIGIBLE_MAXIMUM: f64 = 14.0;
+/// Of the noises, every so many are tried for a place.
+const NOISES_TRIED: usize = 2;
+/// Filters whose ranges' variances differ by less than this factor have the same place.
+const ALIKE: f64 = 1.2;
 /// Slices to either side of the middle at most, and by how many nats one may be worse than the best.
 const SLICES: i32 = 8;
 const NEGLIGIBLE_SLICE: f64 = 6.0;
@@ -25,12 +31,19 @@ pub(super) struct Found {
     slice: Option<Slice>,
 }
 
+impl Found {
+    /// `ln` of its slice's share: slices a deviation apart share out all positions, and their densities sum to one over the deviation.
+    pub(super) fn log_share(&self) -> f64 {
+        self.slice.map_or(0.0, |slice| slice.deviation.ln())
+    }
+}
+
 impl Search<'_> {
     /// `ln p(position, ranges)` up to a constant, with bias and scale integrated out one range after the other.
     fn at(&self, point: &[f64; 3], ranges: &[Collected], variance: f64) -> f64 {
         let [(bias, bias_variance), (scale, scale_variance)] = self.calibration;
         let (mut mean, mut p) = ([bias, scale], [bias_variance, 0.0, scale_variance]);
-        let mut total = 0.0;
+        let (mut total, relative) = (0.0, 1.0 / variance);
         for i in 0..self.axes() {
             let off = (point[i] - self.known.middle[i]) / self.known.spreads[i];
             total -= 0.5 * off * off;
@@ -42,13 +55,14 @@ impl Search<'_> {
             let cross = [p[0] + d * p[1], p[1] + d * p[2]];
             let spread = cross[0] + d * cross[1] + variance;
             let off = one.range - (1.0 + mean[1]) * d - mean[0];
-            total -= 0.5 * off * off / spread;
-            ratio *= spread / variance;
+            let weight = 1.0 / spread;
+            total -= 0.5 * off * off * weight;
+            ratio *= spread * relative;
             if number % 8 == 7 || number + 1 == ranges.len() {
                 total -= 0.5 * f64::ln(ratio);
                 ratio = 1.0;
             }
-            let gain = cross.map(|c| c / spread);
+            let gain = cross.map(|c| c * weight);
             mean = [mean[0] + gain[0] * off, mean[1] + gain[1] * off];
             p = [
                 p[0] - gain[0] * cross[0],
@@ -99,6 +113,9 @@ impl Search<'_> {
             .collect();
         found.sort_by(|a, b| values[*b].total_cmp(&values[*a]));
         found.truncate(MAXIMA);
+        if let Some(highest) = found.first().map(|index| values[*index]) {
+            found.retain(|index| values[*index] > highest - NEGLIGIBLE_MAXIMUM);
+        }
         // The grid is coarse beside the prior of a height, and anchors of like heights have a second place on their other side.
         let heights: &[f64] = if axes == 3 { &[0.0, -1.0, 1.0] } else { &[0.0] };
         let beside = |index: usize| {
@@ -121,7 +138,7 @@ impl Search<'_> {
         let mut best: Option<Found> = None;
         let mut from = start.to_vec();
         // From the largest noise down: the place of one is the start of the next.
-        for noise in self.known.noises.iter().rev() {
+        for noise in self.known.noises.iter().rev().step_by(NOISES_TRIED) {
             let Some((normal, log_evidence)) = fit(self, &from, &Rows::new(ranges, *noise, speed, None), speed, 0.0)
             else {
                 continue;
@@ -140,8 +157,9 @@ impl Search<'_> {
         best
     }
 
-    /// Cuts a place whose law is too long for one linearisation into slices across its longest direction. Empty if it is not.
-    pub(super) fn sliced(&self, one: &Found, ranges: &[Collected], speed: f64) -> Vec<Found> {
+    /// Cuts a place whose law is too long for one linearisation into slices across its longest direction, at most `finest` in a deviation of it. Empty
+    /// if it is not.
+    pub(super) fn sliced(&self, one: &Found, ranges: &[Collected], speed: f64, finest: f64) -> Vec<Found> {
         let (n, axes) = (one.normal.mean.len(), self.axes());
         let positions = DMatrix::from_fn(axes, axes, |i, j| one.normal.covariance[i * n + j]);
         let eigen = positions.symmetric_eigen();
@@ -157,7 +175,7 @@ impl Search<'_> {
         if length < wanted {
             return Vec::new();
         }
-        let deviation = wanted.max(length / 4.0);
+        let deviation = wanted.max(length / finest);
         let mut direction = [0.0; 3];
         (0..axes).for_each(|i| direction[i] = eigen.eigenvectors[(i, longest)]);
         let middle: f64 = (0..axes).map(|i| direction[i] * one.normal.mean[i]).sum();
@@ -195,22 +213,33 @@ impl Search<'_> {
 
     /// The filters of a place with their weights, and its evidence over all of them.
     pub(super) fn bank(&self, one: &Found, ranges: &[Collected], own: f64) -> Option<(Vec<Normal>, Vec<f64>, f64)> {
-        let oldest = ranges.iter().fold(0.0_f64, |most, range| most.max(range.age));
         let mut filters: Vec<Option<(Normal, f64)>> = Vec::new();
+        // Of each fit the variances of the ranges, and its number.
+        let mut fitted: Vec<(Vec<f64>, usize)> = Vec::new();
         for speed in &self.known.speeds {
-            for (i, noise) in self.known.noises.iter().enumerate() {
-                // Ranges that are nearly of one time fit the same place at every speed.
-                let same = filters
-                    .get(i)
-                    .filter(|_| (speed * oldest).powi(2) < 0.05 * noise * noise);
-                let next = match same {
-                    Some(Some((normal, log_evidence))) => {
-                        let mut normal = normal.clone();
+            for noise in &self.known.noises {
+                let variances: Vec<f64> = ranges
+                    .iter()
+                    .map(|range| noise * noise + (speed * range.age).powi(2) + own * own)
+                    .collect();
+                let is_alike = |known: &[f64]| {
+                    let mut pairs = variances.iter().zip(known);
+                    pairs.all(|(a, b)| *a < ALIKE * b && *b < ALIKE * a)
+                };
+                let same = fitted
+                    .iter()
+                    .find(|(known, _)| is_alike(known))
+                    .map(|(_, number)| *number);
+                let next = if let Some(number) = same {
+                    filters[number].clone().map(|(mut normal, log_evidence)| {
                         let n = normal.mean.len();
                         (normal.axes..2 * normal.axes).for_each(|v| normal.covariance[v * n + v] = speed * speed);
-                        Some((normal, *log_evidence))
-                    }
-                    _ => fit(self, &one.normal.mean, &Rows::new(ranges, *noise, *speed, one.slice), *speed, own),
+                        (normal, log_evidence)
+                    })
+                } else {
+                    fitted.push((variances, filters.len()));
+                    let rows = Rows::new(ranges, *noise, *speed, one.slice);
+                    fit(self, &one.normal.mean, &rows, *speed, own)
                 };
                 filters.push(next);
             }
@@ -226,9 +255,7 @@ impl Search<'_> {
             .map(|one| one.as_ref().map_or(0.0, |(_, log)| (log - highest).exp()))
             .collect();
         let total: f64 = weights.iter().sum();
-        // Slices a deviation apart share out all positions: their densities sum to one over the deviation.
-        let share = one.slice.map_or(0.0, |slice| slice.deviation.ln());
-        let log_evidence = highest + (total / weights.len() as f64).ln() + share;
+        let log_evidence = highest + (total / weights.len() as f64).ln() + one.log_share();
         let filters = filters
             .into_iter()
             .map(|one| one.map_or_else(|| stand_in.clone(), |(normal, _)| normal));

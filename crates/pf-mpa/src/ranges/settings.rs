@@ -22,6 +22,9 @@ mod shares {
 }
 /// Uncertainty of a noise or speed that is stated, as a factor.
 const STATED: f64 = 4.0;
+/// Weight below which a filter is left out. A level says less than a range in full: what is left out comes back later.
+const NEGLIGIBLE: f64 = 1e-4;
+pub(super) const NEGLIGIBLE_OF_LEVELS: f64 = 1e-6;
 /// Deviation by which the bias changes in a second, as a share of its own.
 const DRIFT: f64 = 0.002;
 
@@ -125,6 +128,8 @@ pub(super) struct Known {
     /// The deviations of single anchors' biases that are considered, each with its probability.
     pub(super) anchor_biases: Vec<(f64, f64)>,
     pub(super) silence: f64,
+    /// A filter of less weight is left out until changes from its neighbours reach it again, and a smaller share of these does not change a filter.
+    pub(super) negligible: f64,
     /// Deviation of the clock, if it is unknown.
     pub(super) clock: Option<f64>,
 }
@@ -210,6 +215,7 @@ impl RangeSettings {
             drift,
             anchor_biases,
             silence: self.silence,
+            negligible: NEGLIGIBLE,
             clock: self.unknown_clock.then_some(shares::CLOCK * spread),
         })
     }

@@ -7,6 +7,7 @@ mod attacks;
 mod fixtures;
 mod grid;
 mod laws;
+mod odometry;
 mod recording;
 mod rooms;
 mod wild;

@@ -7,6 +7,7 @@ use fewbits_pf_mpa::{RangeSettings, RangeTracker, Travel};
 use nalgebra::{Vector3, Vector4};
 use rand::RngExt;
 use rand_distr::StandardNormal;
+use std::ops::Range;
 
 /// Ranges in each room.
 const LENGTH: usize = 400;
@@ -68,6 +69,7 @@ impl Room {
 /// What a tracker did in one room.
 #[derive(Debug, Default, Clone)]
 struct Outcome {
+    seed: u64,
     rows: usize,
     held: usize,
     longest_wrong: usize,
@@ -86,7 +88,10 @@ fn walk(room: &Room, seed: u64, travel: Travel, settings: RangeSettings) -> Outc
     let mut state =
         Vector4::new(room.middle.0 + even(2.0), even(room.speed), room.middle.1 + even(2.0), even(room.speed));
     let mut tracker = RangeTracker::new(room.anchors.clone(), travel, settings).unwrap();
-    let mut outcome = Outcome::default();
+    let mut outcome = Outcome {
+        seed,
+        ..Outcome::default()
+    };
     let (mut wrong, mut time) = (0, 0.0);
     for k in 0..LENGTH {
         let seconds = 0.1 + 0.2 * rng.random::<f64>();
@@ -120,20 +125,23 @@ fn walk(room: &Room, seed: u64, travel: Travel, settings: RangeSettings) -> Outc
     outcome
 }
 
-fn measure(rooms: u64, travel: Travel) -> (f64, usize) {
+/// The rooms of these seeds.
+fn measure(seeds: Range<u64>, travel: Travel) -> (f64, usize) {
     let settings = RangeSettings {
         anchor_bias: Some(0.0),
         ..RangeSettings::default()
     };
     let outcomes: Vec<(Room, Outcome)> = std::thread::scope(|scope| {
         let half = |odd: u64| {
+            let seeds = seeds.clone();
             scope.spawn(move || {
                 let one = |seed: u64| {
                     let room = Room::random(seed);
                     let outcome = walk(&room, seed, travel, settings);
                     (room, outcome)
                 };
-                (0..rooms).filter(|seed| seed % 2 == odd).map(one).collect::<Vec<_>>()
+                let own = seeds.filter(|seed| seed % 2 == odd);
+                own.map(one).collect::<Vec<_>>()
             })
         };
         [half(0), half(1)]
@@ -150,7 +158,8 @@ fn measure(rooms: u64, travel: Travel) -> (f64, usize) {
         .filter(|(_, one)| one.longest_wrong >= LONG || one.held * 100 < one.rows * 75)
     {
         println!(
-            "{} anchors, noise {:.3}, bias {:.2}, scale {:.3}, speed {:.2}: wrong for {}, held {:.2}, nees {:.1}, rms {:.2}, losses {}",
+            "seed {}: {} anchors, noise {:.3}, bias {:.2}, scale {:.3}, speed {:.2}: wrong for {}, held {:.2}, nees {:.1}, rms {:.2}, losses {}",
+            one.seed,
             room.anchors.len(),
             room.noise,
             room.bias,
@@ -166,7 +175,7 @@ fn measure(rooms: u64, travel: Travel) -> (f64, usize) {
     let share = held as f64 / rows as f64;
     let sum = |of: fn(&Outcome) -> f64| outcomes.iter().map(|(_, one)| of(one)).sum::<f64>();
     println!(
-        "{travel:?}: {rooms} rooms: held {share:.4}, wrong in {wrong}, losses {}, searching {}: {:.0} us a range; tracking {:.1} us a range",
+        "{travel:?}: rooms {seeds:?}: held {share:.4}, wrong in {wrong}, losses {}, searching {}: {:.0} us a range; tracking {:.1} us a range",
         sum(|one| one.losses as f64),
         sum(|one| one.searching as f64),
         1e6 * sum(|one| one.seconds[0]) / sum(|one| one.searching as f64 + 1.0),
@@ -194,9 +203,21 @@ const TRAVELS: [Travel; 3] = [Travel::Full, Travel::Bits(1), Travel::Bits(2)];
 #[test]
 fn no_confident_place_is_wrong() {
     for travel in TRAVELS {
-        let (share, wrong) = measure(12, travel);
+        let (share, wrong) = measure(0..12, travel);
         assert!(wrong == 0 && share > 0.9, "{travel:?}: {wrong} rooms, bands hold {share}");
     }
+}
+
+/// Defect: with 2 bits, ranges of which it is doubtful whether they depend on the distance left a covariance that was not positive definite.
+#[test]
+fn doubtful_ranges_leave_a_covariance() {
+    let settings = RangeSettings {
+        anchor_bias: Some(0.0),
+        ..RangeSettings::default()
+    };
+    // `walk` asserts that the error can be normalised.
+    let outcome = walk(&Room::random(141), 141, Travel::Bits(2), settings);
+    assert!(outcome.rows > 0 && outcome.longest_wrong < LONG, "{outcome:?}");
 }
 
 /// Three ranges without error that never change leave a curve of places when bias and scale are unknown: the band holds the true one for good.
@@ -269,16 +290,14 @@ fn an_unknown_clock_loses_no_track() {
     );
 }
 
-/// The measurement in full: 400 rooms.
+/// The measurement in full: 400 rooms from seed `FROM` on.
 #[test]
 #[ignore = "minutes"]
 fn four_hundred_rooms() {
-    let rooms = std::env::var("ROOMS")
-        .ok()
-        .and_then(|rooms| rooms.parse().ok())
-        .unwrap_or(400);
+    let number = |name: &str| std::env::var(name).ok().and_then(|number| number.parse::<u64>().ok());
+    let (from, rooms) = (number("FROM").unwrap_or(0), number("ROOMS").unwrap_or(400));
     for travel in TRAVELS {
-        let (share, wrong) = measure(rooms, travel);
+        let (share, wrong) = measure(from..from + rooms, travel);
         assert!(wrong == 0, "{travel:?}: {wrong} rooms");
         assert!((0.93..=0.97).contains(&share), "{travel:?}: bands hold {share}");
     }

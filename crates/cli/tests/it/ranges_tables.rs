@@ -1,0 +1,170 @@
+//! `fewbits ranges` on tables as people write them: odometry, anchors' columns, negative ranges, late rows, an anchor that is wrong.
+
+use crate::numbers::Numbers;
+use crate::ranges::{Point, RECTANGLE, anchors, distance, holds, off, ranges, table};
+use crate::{fewbits, refused, text};
+
+/// Columns of what the target moved since the row before: it is followed between ranges, in rows without any too.
+#[test]
+fn odometry_carries_the_place_between_ranges() {
+    let folder = tempfile::tempdir().unwrap();
+    anchors(folder.path(), &RECTANGLE, 1.0, false);
+    let at = |row: usize| {
+        let angle = 0.9 * row as f64;
+        [6.0 + 2.0 * angle.cos(), 3.5 + 2.0 * (1.7 * angle).sin(), 0.0]
+    };
+    let mut numbers = Numbers(5);
+    let mut input = "time,n0,n1,n2,n3,dx,dy\n".to_owned();
+    for row in 0..120 {
+        let (here, before) = (at(row), at(row.saturating_sub(1)));
+        let cells: Vec<String> = (0..4)
+            .map(|i| {
+                let is_there = row < 4 || row % 5 == 0;
+                let range = distance(&RECTANGLE[i], &here) + 0.03 * numbers.normal();
+                if is_there { range.to_string() } else { String::new() }
+            })
+            .collect();
+        let moved = [here[0] - before[0], here[1] - before[1]];
+        input += &format!("{row},{},{},{}\n", cells.join(","), moved[0], moved[1]);
+    }
+    let options = ["--bias", "0", "--scale", "0"];
+    let rms = |rows: &[serde_json::Value]| {
+        let squares: f64 = rows
+            .iter()
+            .enumerate()
+            .map(|(row, one)| off(one, &at(row)).powi(2))
+            .sum();
+        (squares / rows.len() as f64).sqrt()
+    };
+    let with = ranges(folder.path(), &input, &[&options[..], &["--odometry", "dx,dy"]].concat());
+    assert!(with.iter().all(|row| row["x"].is_f64()), "{with:?}");
+    assert!(rms(&with) < 0.15, "{}", rms(&with));
+    // The same as reports of a long table.
+    let mut long = "time,anchor,value\n".to_owned();
+    for line in input.lines().skip(1) {
+        let cells: Vec<&str> = line.split(',').collect();
+        let names = ["n0", "n1", "n2", "n3", "dx", "dy"];
+        for (name, cell) in names.iter().zip(&cells[1..]).filter(|(_, cell)| !cell.is_empty()) {
+            long += &format!("{},{name},{cell}\n", cells[0]);
+        }
+    }
+    let words = [&options[..], &["--odometry", "dx,dy", "--by", "anchor"]].concat();
+    assert!(rms(&ranges(folder.path(), &long, &words)) < 0.15);
+    let words = ["ranges", "-", "--anchors", "anchors.csv", "--odometry"];
+    for (bad, why) in [
+        ("dx", "two columns"),
+        ("dx,dz", "no column `dz`"),
+        ("dx,n0", "no anchor"),
+    ] {
+        let error = refused(folder.path(), &[&words[..], &[bad]].concat(), input.as_bytes());
+        assert!(error.contains(why), "{bad}: {error}");
+    }
+}
+
+/// With bias and scale unknown, four anchors explain almost anything: if one is much too long, the rows must say that something is wrong, or hold
+/// the place. Bands hold both coordinates in nine of ten cases. Calibrated ranges say nothing.
+#[test]
+fn an_anchor_that_bias_and_scale_take_up_is_not_silent() {
+    let folder = tempfile::tempdir().unwrap();
+    let places = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 3.0, 0.0], [0.0, 3.0, 0.0]];
+    anchors(folder.path(), &places, 1.0, false);
+    let mut silent = 0;
+    let truths = [[1.4, 0.9, 0.0], [2.6, 1.8, 0.0], [1.1, 2.1, 0.0], [2.9, 0.7, 0.0]];
+    for (seed, truth) in (1..).zip(truths) {
+        for (bad, late) in [(0, 1.5), (2, 2.0), (1, 3.0)] {
+            let mut numbers = Numbers(seed);
+            let input = table(4, 100, |_, i| {
+                distance(&places[i], &truth) + 0.04 * numbers.normal() + if i == bad { late } else { 0.0 }
+            });
+            let rows = ranges(folder.path(), &input, &[]);
+            let last = rows.last().unwrap();
+            silent += usize::from(last["events"].as_str().unwrap_or_default().is_empty() && !holds(last, &truth));
+        }
+        let mut numbers = Numbers(10 + seed);
+        let good = table(4, 100, |_, i| distance(&places[i], &truth) + 0.04 * numbers.normal());
+        let rows = ranges(folder.path(), &good, &[]);
+        assert!(rows[10..].iter().all(|row| row["events"] != "doubtful"), "{truth:?}");
+    }
+    assert!(silent <= 2, "{silent} of 12");
+}
+
+/// Tables of anchors as people write them: the names of columns say which is which, whatever stands between them.
+#[test]
+fn anchors_are_read_by_the_names_of_their_columns() {
+    let folder = tempfile::tempdir().unwrap();
+    let truth = [4.1, 2.2, 0.0];
+    let input = table(4, 12, |_, i| distance(&RECTANGLE[i], &truth));
+    let with = |head: &str, row: &dyn Fn(usize, &Point) -> String| {
+        let rows: Vec<String> = RECTANGLE.iter().enumerate().map(|(i, place)| row(i, place)).collect();
+        format!("{head}{}\n", rows.join("\n"))
+    };
+    for anchors in [
+        with("anchor,y,x\n", &|i, [x, y, _]| format!("n{i},{y},{x}")),
+        with("x,y,id,remark\n", &|i, [x, y, _]| format!("{x},{y},n{i},by door {i}")),
+        with("Y [m];Node;X [m]\n", &|i, [x, y, _]| format!("{y};n{i};{x}")),
+        with("", &|i, [x, y, _]| format!("n{i},{x},{y}")),
+    ] {
+        std::fs::write(folder.path().join("anchors.csv"), &anchors).unwrap();
+        let rows = ranges(folder.path(), &input, &["--bias", "0", "--scale", "0"]);
+        assert!(off(rows.last().unwrap(), &truth) < 0.02, "{anchors}: {}", rows[11]);
+    }
+    let degrees = with("name,lat,lon\n", &|i, [x, y, _]| format!("n{i},{y},{x}"));
+    std::fs::write(folder.path().join("anchors.csv"), degrees).unwrap();
+    let error = refused(folder.path(), &["ranges", "-", "--anchors", "anchors.csv"], input.as_bytes());
+    assert!(error.contains("no degrees"), "{error}");
+}
+
+/// Radios write a negative number for no range.
+#[test]
+fn negative_ranges_are_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    anchors(folder.path(), &RECTANGLE, 1.0, false);
+    let truth = [4.1, 2.2, 0.0];
+    let mut numbers = Numbers(3);
+    let input = table(4, 150, |row, i| {
+        let range = distance(&RECTANGLE[i], &truth) + 0.04 * numbers.normal();
+        if (3 * row + i) % 7 < 2 { -1.0 } else { range }
+    });
+    let words = [
+        "ranges",
+        "-",
+        "--anchors",
+        "anchors.csv",
+        "--json",
+        "--bias",
+        "0",
+        "--scale",
+        "0",
+    ];
+    let output = fewbits(folder.path(), &words, input.as_bytes());
+    let rows: Vec<serde_json::Value> = text(&output.stdout)
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert!(
+        rows.iter()
+            .skip(5)
+            .all(|row| off(row, &truth) < 0.2 && row["events"] == ""),
+        "{}",
+        rows[149]
+    );
+    let summary: serde_json::Value = serde_json::from_str(text(&output.stderr).lines().last().unwrap()).unwrap();
+    assert_eq!(summary["negative"], input.matches("-1").count(), "{summary}");
+}
+
+/// Rows of several radios are not always in order.
+#[test]
+fn late_rows_are_taken_in() {
+    let folder = tempfile::tempdir().unwrap();
+    anchors(folder.path(), &RECTANGLE, 1.0, false);
+    let truth = [4.1, 2.2, 0.0];
+    let mut rows: Vec<String> = (0..80)
+        .map(|k| format!("{},n{},{}", 0.2 * f64::from(k), k % 4, distance(&RECTANGLE[k as usize % 4], &truth)))
+        .collect();
+    rows.swap(30, 31);
+    let input = format!("time,anchor,range\n{}\n", rows.join("\n"));
+    let options = ["--by", "anchor", "--late", "2s", "--bias", "0", "--scale", "0"];
+    assert!(off(ranges(folder.path(), &input, &options).last().unwrap(), &truth) < 0.02);
+    let words = ["ranges", "-", "--anchors", "anchors.csv", "--by", "anchor"];
+    assert!(refused(folder.path(), &words, input.as_bytes()).contains("--late"));
+}

@@ -1,0 +1,79 @@
+//! Odometry: what the target moved between ranges.
+
+use super::RangeTracker;
+use super::bank::Hypothesis;
+use super::estimate::RangeEstimate;
+use super::gaussian::Step;
+use super::rows::Collected;
+use crate::Error;
+use fewbits_numerics::error::{finite, refuse};
+use nalgebra::Vector3;
+
+/// The latest range in full of an anchor.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Latest {
+    pub(super) time: f64,
+    range: f64,
+    /// What the target moved since.
+    moved: [f64; 3],
+}
+
+impl Latest {
+    pub(super) fn new(time: f64, range: f64) -> Self {
+        Self {
+            time,
+            range,
+            moved: [0.0; 3],
+        }
+    }
+
+    /// The range as one that a place at `time` must explain. The target was where it is less what it moved: so the anchor is moved instead.
+    pub(super) fn seen_at(&self, time: f64, anchor: usize, place: &[f64; 3]) -> Collected {
+        let mut place = *place;
+        place.iter_mut().zip(&self.moved).for_each(|(x, by)| *x += by);
+        Collected {
+            anchor,
+            place,
+            range: self.range,
+            age: time - self.time,
+        }
+    }
+}
+
+impl RangeTracker {
+    pub(super) fn check_time(&self, time: f64) -> Result<(), Error> {
+        let earliest = self.last.max(self.at);
+        if finite("time", time)? < earliest {
+            return refuse("time", time, format!("{earliest} or later"));
+        }
+        Ok(())
+    }
+
+    /// Moves the target by what odometry says that it moved until `time` since the last call, along the axes of the anchors' coordinates. The
+    /// third coordinate counts only if the height is estimated. With odometry, `speed` of the settings is the deviation of its error per second,
+    /// which lasts for `persistence` and is estimated. Returns the estimate; `None` during acquisition.
+    ///
+    /// # Errors
+    /// If a number is not finite or moves a place to where it is not, or `time` is before the last range's or displacement's.
+    pub fn moved(&mut self, time: f64, by: &Vector3<f64>) -> Result<Option<RangeEstimate>, Error> {
+        self.check_time(time)?;
+        by.iter().try_for_each(|x| finite("by", *x).map(|_| ()))?;
+        let mut whole = [by.x, by.y, by.z];
+        if self.known.axes < 3 {
+            whole[2] = 0.0;
+        }
+        let mut next = self.hypotheses.clone();
+        if !next.is_empty() {
+            let step = Step::over(time - self.at, self.known.persistence, self.known.drift);
+            next.iter_mut().for_each(|one| one.carry(&self.known, &step, &whole));
+            if !next.iter().all(Hypothesis::is_finite) {
+                return refuse("by", format!("{by:?}"), "a displacement after which places are finite");
+            }
+            (self.hypotheses, self.at) = (next, time);
+        }
+        for latest in self.collected.values_mut() {
+            latest.moved.iter_mut().zip(&whole).for_each(|(sum, x)| *sum += x);
+        }
+        Ok(self.estimate(false))
+    }
+}
