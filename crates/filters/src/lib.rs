@@ -13,7 +13,7 @@
 //! | any dynamics, any likelihood | [`BootstrapFilter`], [`GuidedFilter`] | [`ResamplingRule`], [`Resampling`] |
 //! | linear Gaussian state, any factor of scalars | [`RaoBlackwellised`] (measurements imputed, states exact) | [`impute`] |
 //! | several models, one at a time | [`Imm`] (interacting multiple models) | [`Switching`] (their dynamics) |
-//! | the exact answer for a scalar | [`PointMassFilter`] | [`TransitionKernel`] (its time update) |
+//! | the exact answer for a scalar | [`PointMassFilter`] (any dynamics, fixed grid), [`MovingGridFilter`] (linear dynamics) | [`TransitionKernel`] (its time update) |
 //! | the exact answer for a few numbers | | [`LatticeFilter`] (independent noise on each) |
 //! | smoothing | | [`smoother`] (Gaussian beliefs: Rauch-Tung-Striebel), [`backward_simulation`] (particles), [`TransitionKernel::smooth`] (a grid) |
 //! | calibration of sensors and level from recorded readings | [`fit`] (maximum likelihood), [`calibration`] (noises and change alone) | |

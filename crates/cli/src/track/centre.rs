@@ -118,6 +118,7 @@ struct Centre<const D: usize, F: StateFilter<D>> {
     members: Vec<Member>,
     purpose: Use,
     period: Option<f64>,
+    is_cut: bool,
     zero: f64,
     rng: Pcg64Mcg,
     world: ContinuousLinear<D>,
@@ -157,6 +158,7 @@ impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
             members: Vec::new(),
             purpose,
             period: world.period,
+            is_cut: world.is_cut,
             zero: world.zero,
             rng,
             world: model,
@@ -272,7 +274,10 @@ impl<const D: usize, F: StateFilter<D>> Estimator for Centre<D, F> {
             Event::NoiseOverstated => ("noise overstated", None),
             _ => ("reacquired", None),
         });
-        let events: Vec<_> = events.collect();
+        // Alarms are about values that come whatever they are, not about those that were sent because they are far from the last.
+        let is_meant =
+            |event: &(&'static str, Option<usize>)| !self.is_cut || !matches!(event.0, "lost" | "noise overstated");
+        let events: Vec<_> = events.filter(is_meant).collect();
         let rejected = events.iter().filter(|(event, _)| *event == "rejected").count();
         let belief = self.centre.estimate();
         if let Some(kept) = &mut self.kept {

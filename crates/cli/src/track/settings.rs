@@ -244,6 +244,12 @@ impl Settings {
                 Ok(())
             }
         };
+        if instants.has_samples() && asked_noise.is_none() {
+            return Err(Error::Needed {
+                option: "--noise",
+                reason: "values that a sensor sends only on change do not tell it",
+            });
+        }
         can_look("--noise", asked_noise.is_some())?;
         can_look("--change", asked_change.is_some())?;
         can_look("--prior", asked_prior.is_some())?;

@@ -190,7 +190,7 @@ fn silence_between_single_reports_says_something() {
         let (plain, summary) = tracked(&table, &["--by", "name"]);
         assert!(has_hint(&summary, "sends on change"), "{summary}");
         let (silent, _) = tracked(&table, &["--by", "name", "--silent-within", "0.3"]);
-        let (sampled, _) = tracked(&table, &["--by", "name", "--silent-within", "0.3/60s"]);
+        let (sampled, _) = tracked(&table, &["--by", "name", "--silent-within", "0.3/60s", "--noise", "0.03"]);
         for (which, rows) in [plain, silent, sampled].iter().enumerate() {
             assert_eq!(rows.len(), truth.len());
             for (row, level) in rows.iter().zip(&truth) {

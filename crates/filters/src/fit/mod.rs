@@ -162,7 +162,7 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
         problem.try_walks(relative_to, &mut refused);
     }
     if request.slope {
-        problem.try_without_slopes(&mut refused);
+        problem.try_without_slopes(request.walk, &mut refused);
     }
     let estimates = problem.errors(&mut refused);
     let (log_likelihood, residuals) = problem.model.log_likelihood(instants)?;

@@ -11,6 +11,9 @@ use nalgebra::{DMatrix, DVector};
 /// A walk cannot be negative, so half of that is as much evidence.
 const WORTH: f64 = 2.0;
 const WORTH_OF_WALK: f64 = 1.35;
+/// The same of a drift beside a walk, or in place of one: a drift of several deviations of the noise that is there loses more than ten by being taken for
+/// a walk.
+const WORTH_BESIDE_WALK: f64 = 6.0;
 /// Deviation of the logarithm of a change or a noise about the first guess: nothing may be taken for zero only because the readings do not
 /// tell it from zero.
 const VAGUE: f64 = 2.0;
@@ -259,14 +262,7 @@ impl<'a> Problem<'a> {
             }
             let (before, free) = (self.model.clone(), self.free.clone());
             let steady = self.worth(&before);
-            let whole = before.sensors[sensor].noise / self.length.sqrt();
-            self.free.push(Quantity::Walk(sensor));
-            let wandering = [0.5, 2.0, 8.0].map(|factor| {
-                let mut model = before.clone();
-                model.sensors[sensor].walk = factor * whole;
-                model
-            });
-            self.take_best(wandering.into_iter());
+            self.let_wander(sensor);
             if self.climb_nearly() < steady + WORTH_OF_WALK {
                 (self.model, self.free) = (before, free);
                 refused.push(Refusal {
@@ -279,8 +275,21 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Leaves out the drifts without which the readings are explained as well.
-    pub(super) fn try_without_slopes(&mut self, refused: &mut Vec<Refusal>) {
+    /// Gives the offset of a sensor a walk to begin with.
+    fn let_wander(&mut self, sensor: usize) {
+        let whole = self.model.sensors[sensor].noise / self.length.sqrt();
+        self.free.push(Quantity::Walk(sensor));
+        let wandering = [0.5, 2.0, 8.0].map(|factor| {
+            let mut model = self.model.clone();
+            model.sensors[sensor].walk = factor * whole;
+            model
+        });
+        self.take_best(wandering.into_iter());
+    }
+
+    /// Leaves out the drifts without which the readings are explained as well, and, if `may_wander`, nearly as well by an offset that wanders: a walk
+    /// looks like a drift, and a drift is extended beyond the readings.
+    pub(super) fn try_without_slopes(&mut self, may_wander: bool, refused: &mut Vec<Refusal>) {
         for sensor in 0..self.model.sensors.len() {
             let slope = Quantity::Slope(sensor);
             if !self.free.contains(&slope) {
@@ -293,7 +302,17 @@ impl<'a> Problem<'a> {
             let model = &mut self.model.sensors[sensor];
             model.bias += 0.5 * model.slope * self.length;
             model.slope = 0.0;
-            if self.climb_nearly() + WORTH < drifting {
+            let is_wandering = self.free.contains(&Quantity::Walk(sensor));
+            let most = if is_wandering { WORTH_BESIDE_WALK } else { WORTH };
+            let mut is_left = self.climb_nearly() + most >= drifting;
+            if !is_left && may_wander && !is_wandering {
+                self.let_wander(sensor);
+                is_left = self.climb_nearly() + WORTH_BESIDE_WALK >= drifting;
+                if is_left {
+                    refused.retain(|one| one.quantity != Quantity::Walk(sensor));
+                }
+            }
+            if !is_left {
                 (self.model, self.free) = (before, free);
             } else {
                 if self.part.is_some() {

@@ -234,7 +234,7 @@ fn a_noise_that_may_as_well_be_larger_is_not_left_at_the_least() {
 /// What the offsets' errors shift the level is as large as it is found to be, over many tables.
 #[test]
 fn the_shift_by_offsets_is_as_large_as_said() {
-    for noises in [&[0.5, 0.5][..], &[0.3, 1.0, 0.5, 2.0], &[0.5; 7]] {
+    for noises in [&[0.5, 1.0][..], &[0.3, 1.0, 0.5, 2.0], &[0.2, 1.0, 1.0, 1.0, 1.0]] {
         let weights: Vec<f64> = noises.iter().map(|noise| 1.0 / (noise * noise)).collect();
         let sum: f64 = weights.iter().sum();
         let (mut squares, mut said, tables) = (0.0, 0.0, 200);
@@ -250,9 +250,9 @@ fn the_shift_by_offsets_is_as_large_as_said() {
             squares += shift * shift;
             said += shift_deviation(&instants, &weights, None).powi(2);
         }
-        // Both vary by a tenth with so many tables; a jackknife of a median is rather too wide.
+        // The errors vary by a twentieth with so many tables; a jackknife of medians is good to a fifth or so.
         let ratio = (said / squares).sqrt();
-        assert!((0.8..1.5).contains(&ratio), "{noises:?}: {ratio}");
+        assert!((0.75..1.5).contains(&ratio), "{noises:?}: {ratio}");
     }
     assert_eq!(shift_deviation(&recorded(1, 0.1, &[0.5], &[], 100), &[1.0], None), 0.0);
 }

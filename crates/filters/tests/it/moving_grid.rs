@@ -1,7 +1,7 @@
 //! The filter on a grid that goes with the belief, against the Kalman filter, a fixed fine grid and particles.
 
 use fewbits_core::factor::{Levels, Value};
-use fewbits_core::{Belief, Cell, Evolution, Gaussian, Likelihood, Observed};
+use fewbits_core::{Belief, Cell, Gaussian, Likelihood, Observed};
 use fewbits_filters::{BootstrapFilter, Error, MomentFilter, MovingGridFilter, ResamplingRule, StateFilter};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use rand::SeedableRng;
@@ -14,7 +14,7 @@ fn step<F: StateFilter<1>>(
     belief: &mut F::Belief,
     seen: (f64, &dyn Likelihood<1>),
 ) -> f64 {
-    filter.predict(rng, &*world.over(seen.0).unwrap(), belief).unwrap();
+    filter.predict(rng, &world.over(seen.0).unwrap(), belief).unwrap();
     filter.update(rng, belief, &[seen.1]).unwrap().log_likelihood
 }
 
