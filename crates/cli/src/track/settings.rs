@@ -211,7 +211,8 @@ impl Settings {
                 sensors,
                 steepest: 0.0,
                 is_smoothed: options.smooth.is_some(),
-                is_cut: within.is_some(),
+                // Of single reports nothing tells the noise, and a wrong one misleads an exact filter more.
+                is_cut: within.is_some() && (asked_noise.is_some() || options.table.by.is_none()),
                 zero: 0.0,
                 is_learning: options
                     .learning
