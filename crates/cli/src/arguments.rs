@@ -259,8 +259,9 @@ pub(crate) struct TrackOptions {
     /// where it is coarser than the noise; `no`: values are not rounded. Default: `found`.
     #[arg(long, value_name = "STEP|found|no")]
     pub(crate) rounded: Option<String>,
-    /// An empty cell says that the measurement is within this width of the sensor's last value, as from sensors that send on change.
-    #[arg(long, value_name = "WIDTH")]
+    /// An empty cell says that the measurement is within this width of the sensor's last value, as from sensors that send on change. `0.5/60s`:
+    /// it measured every minute, also where there is no row.
+    #[arg(long, value_name = "WIDTH[/TIME]")]
     pub(crate) silent_within: Option<String>,
     /// Detection limits, as `0.25..` or `0.25..40`: a value at or beyond a limit says only that the measurement is beyond it.
     #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true)]
@@ -346,4 +347,28 @@ pub(crate) struct GenerateOptions {
     /// Write one manual page per task into this folder, instead of the first one to standard output.
     #[arg(long, value_name = "FOLDER")]
     pub(crate) folder: Option<PathBuf>,
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::Cli;
+    use clap::CommandFactory;
+    use std::collections::HashSet;
+
+    /// Defect: `fit` had `--by` from two structures, and read the one that was never filled.
+    #[test]
+    fn no_task_has_an_option_twice() {
+        let mut waiting = vec![Cli::command()];
+        while let Some(command) = waiting.pop() {
+            let (mut ids, mut names) = (HashSet::new(), HashSet::new());
+            for argument in command.get_arguments() {
+                assert!(ids.insert(argument.get_id().clone()), "{}: {argument}", command.get_name());
+                if let Some(long) = argument.get_long() {
+                    assert!(names.insert(long.to_owned()), "{}: --{long}", command.get_name());
+                }
+            }
+            waiting.extend(command.get_subcommands().cloned());
+        }
+    }
 }

@@ -23,9 +23,6 @@ pub(crate) enum Sought {
 pub(crate) struct FitOptions {
     #[command(flatten)]
     pub(crate) table: TableOptions,
-    /// Each row is one reading: the column with the name of its sensor. Values are in the other column, or that of `--columns`.
-    #[arg(long, value_name = "NAME")]
-    pub(crate) by: Option<String>,
     /// The sensor that is right: offsets, gains, drifts and delays are relative to it. Default: they are relative to the sensor with the most
     /// values, and what all have in common cannot be found.
     #[arg(long, value_name = "NAME")]

@@ -1,8 +1,14 @@
 //! Rauch-Tung-Striebel smoothing, one backward step at a time. Applied to a whole record it is the fixed-interval smoother, applied to the
 //! last few beliefs the fixed-lag smoother.
 //!
+//! [`smooth`] goes over a whole recording.
+//!
 //! It needs only the filtered beliefs and the dynamics, so it smooths the output of any filter with Gaussian
 //! beliefs, whatever was observed.
+
+mod recorded;
+
+pub use recorded::{Filtered, smooth};
 
 use crate::{Error, kalman};
 use fewbits_core::{Gaussian, GaussianDynamics, LinearDynamics};

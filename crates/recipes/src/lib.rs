@@ -44,7 +44,7 @@
 //! | rows out of a recording | [`unpack`] |
 //! | a recording against its table | [`verify`] |
 //! | quantizers for an unknown that several sensors measure | [`design`] |
-//! | estimates that know what came after them | [`smoothing`] |
+//! | the step to which values are rounded | [`rounding`] |
 //! | readings that state their own accuracy, rounding and limits | [`stated`] |
 //!
 //! Not here: files, printing and options (`fewbits-cli`), the format (`fewbits-record`), how values are predicted and coded
@@ -57,7 +57,7 @@ pub mod look;
 pub mod names;
 pub mod pack;
 pub mod plan;
-pub mod smoothing;
+pub mod rounding;
 pub mod source;
 pub mod stated;
 pub mod table;

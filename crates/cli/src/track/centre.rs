@@ -3,17 +3,18 @@
 use super::meaning::Seat;
 use super::rows::{Instant, Said};
 use super::sensors;
+use super::world::World;
 use crate::arguments::Model;
 use crate::error::Failure;
 use crate::report::Report;
 use fewbits_core::{BitString, Gaussian, Link, Message, NumberFormat, Observation, OnAxes, SensorNode};
-use fewbits_filters::calibration::{self, Calibration, Level, Number};
+use fewbits_filters::calibration;
 use fewbits_filters::centre::{Event, Failures, FalseAlarms, FusionCentre, NoiseLearning, ReportTest, Reporting, Slot};
-use fewbits_filters::{Error as FilterError, MomentFilter};
+use fewbits_filters::smoother::{Filtered, smooth};
+use fewbits_filters::{MomentFilter, MovingGridFilter, StateFilter};
 use fewbits_models::{ContinuousLinear, LinearSensor};
-use fewbits_recipes::smoothing::{Filtered, smooth};
 use fewbits_recipes::stated::{StatedReading, Stating};
-use nalgebra::{SMatrix, SVector, Vector1};
+use nalgebra::Vector1;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
@@ -29,97 +30,6 @@ const ALARMS: FalseAlarms = FalseAlarms {
 const LEARNING: f64 = 0.01;
 /// Bits of a value.
 const VALUE_BITS: usize = 64;
-/// Standard deviation of an unknown slope, in multiples of the change per time.
-const STEEPEST: f64 = 10.0;
-
-/// Model of the level.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct World {
-    pub(super) model: Model,
-    /// Standard deviation of the level from its forecast, and after how many seconds.
-    pub(super) change: f64,
-    pub(super) within: f64,
-    /// Mean and standard deviation of the level before the first row.
-    pub(super) prior: (f64, f64),
-    /// The same of the slope per second, if it is stated.
-    pub(super) slope: Option<(f64, f64)>,
-    /// Standard deviation of the slope per second that the first rows suggest; 0 if they are not known.
-    pub(super) steepest: f64,
-    /// Period of the level, if it is an angle.
-    pub(super) period: Option<f64>,
-    /// Whether the change is adapted during the run.
-    pub(super) is_learning: bool,
-    /// Number of sensors of the first rows.
-    pub(super) sensors: usize,
-    /// Whether all beliefs are kept, to be smoothed.
-    pub(super) is_smoothed: bool,
-    /// Seconds between rows.
-    pub(super) interval: f64,
-}
-
-impl World {
-    /// Mean and covariance of the state before the first row.
-    fn start<const D: usize>(&self, change: f64) -> Result<Gaussian<D>, FilterError> {
-        let per_time = STEEPEST * change;
-        let of = |i: usize| match (i, self.slope) {
-            (0, _) => self.prior,
-            (1, Some(slope)) => slope,
-            (1, None) => (0.0, (per_time / self.within).max(self.steepest)),
-            _ => (0.0, per_time / self.within.powi(i as i32)),
-        };
-        let mean = SVector::<f64, D>::from_fn(|i, _| of(i).0);
-        let deviations = SVector::<f64, D>::from_fn(|i, _| of(i).1);
-        Ok(Gaussian::new(mean, SMatrix::from_diagonal(&deviations.component_mul(&deviations)))?)
-    }
-
-    /// From known values at time 0, the level after `t` has the variance `q t`, `q t^3 / 3` or `q t^5 / 20` if the level, the slope or the
-    /// curvature is a random walk of density `q`. Here it is `change^2`.
-    fn walk(&self, change: f64) -> Result<ContinuousLinear<1>, FilterError> {
-        let (c, t) = (change * change, self.within);
-        match self.model {
-            Model::Returning => {
-                let variance = self.prior.1 * self.prior.1;
-                // The deviation after `within` seconds, `v (1 - exp(-2 t / tau))`, solved for `tau`.
-                let rate = -0.5 * (-c / variance).ln_1p() / t;
-                ContinuousLinear::ornstein_uhlenbeck(self.prior.0, 1.0 / rate, variance)
-            }
-            _ => ContinuousLinear::random_walk(c / t),
-        }
-    }
-
-    fn velocity(&self, change: f64) -> Result<ContinuousLinear<2>, FilterError> {
-        ContinuousLinear::nearly_constant_velocity(3.0 * change * change / self.within.powi(3))
-    }
-
-    fn acceleration(&self, change: f64) -> Result<ContinuousLinear<3>, FilterError> {
-        ContinuousLinear::nearly_constant_acceleration(20.0 * change * change / self.within.powi(5))
-    }
-
-    /// Change and noise of each sensor, found together from the first values.
-    pub(super) fn calibrate(
-        &self,
-        instants: &[calibration::Instant],
-        change: Number,
-        guess: f64,
-        noises: &[Number],
-    ) -> Result<Calibration, FilterError> {
-        let period = self.period;
-        match self.model {
-            Model::Velocity => {
-                let (world, prior) = (|change| self.velocity(change), &self.start(guess)?);
-                Level { world, prior, period }.calibrate(instants, change, noises)
-            }
-            Model::Acceleration => {
-                let (world, prior) = (|change| self.acceleration(change), &self.start(guess)?);
-                Level { world, prior, period }.calibrate(instants, change, noises)
-            }
-            _ => {
-                let (world, prior) = (|change| self.walk(change), &self.start(guess)?);
-                Level { world, prior, period }.calibrate(instants, change, noises)
-            }
-        }
-    }
-}
 
 /// Results of one instant.
 #[derive(Debug, Clone, PartialEq)]
@@ -166,11 +76,22 @@ pub(super) enum Use {
 /// A centre for the model.
 pub(super) fn centre(world: &World, purpose: Use) -> Result<Box<dyn Estimator>, Failure> {
     Ok(match world.model {
-        Model::Velocity => Box::new(Centre::<2>::new(world.velocity(world.change)?, world, purpose)?),
-        Model::Acceleration => Box::new(Centre::<3>::new(world.acceleration(world.change)?, world, purpose)?),
+        Model::Velocity => {
+            let model = world.velocity(world.change)?;
+            Box::new(Centre::<2, _>::new(model, MomentFilter, world, purpose)?)
+        }
+        Model::Acceleration => {
+            let model = world.acceleration(world.change)?;
+            Box::new(Centre::<3, _>::new(model, MomentFilter, world, purpose)?)
+        }
         // Ranges have their own tracker.
         Model::Returning | Model::Walk | Model::Ranges => {
-            Box::new(Centre::<1>::new(world.walk(world.change)?, world, purpose)?)
+            let model = world.walk(world.change)?;
+            if world.is_cut {
+                Box::new(Centre::<1, _>::new(model, MovingGridFilter, world, purpose)?)
+            } else {
+                Box::new(Centre::<1, _>::new(model, MomentFilter, world, purpose)?)
+            }
         }
     })
 }
@@ -192,33 +113,37 @@ struct Member {
     last: Option<f64>,
 }
 
-struct Centre<const D: usize> {
-    centre: FusionCentre<D, MomentFilter>,
+struct Centre<const D: usize, F: StateFilter<D>> {
+    centre: FusionCentre<D, F>,
     members: Vec<Member>,
     purpose: Use,
     period: Option<f64>,
+    is_cut: bool,
+    zero: f64,
     rng: Pcg64Mcg,
     world: ContinuousLinear<D>,
     /// All beliefs, if they are to be smoothed.
     kept: Option<Vec<Filtered<D>>>,
 }
 
-/// Mean and standard deviation of each coordinate.
-fn moments<const D: usize>(belief: &Gaussian<D>) -> Vec<(f64, f64)> {
-    (0..D)
-        .map(|i| (belief.mean()[i], belief.covariance()[(i, i)].sqrt()))
-        .collect()
+/// Mean and standard deviation of each coordinate. `zero`: standard deviation of what all values of the level may be off.
+fn moments<const D: usize>(belief: &Gaussian<D>, zero: f64) -> Vec<(f64, f64)> {
+    let deviation = |i: usize| {
+        let own = belief.covariance()[(i, i)].sqrt();
+        if i == 0 { own.hypot(zero) } else { own }
+    };
+    (0..D).map(|i| (belief.mean()[i], deviation(i))).collect()
 }
 
-impl<const D: usize> Centre<D> {
-    fn new(model: ContinuousLinear<D>, world: &World, purpose: Use) -> Result<Self, Failure> {
+impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
+    fn new(model: ContinuousLinear<D>, filter: F, world: &World, purpose: Use) -> Result<Self, Failure> {
         let mut rng = Pcg64Mcg::seed_from_u64(0);
         let prior = world.start::<D>(world.change)?;
         let failures = Failures {
             rate: FAILURE / world.interval,
             ..Failures::default()
         };
-        let mut centre = FusionCentre::new(&mut rng, model, MomentFilter, &prior)?.with_failures(failures)?;
+        let mut centre = FusionCentre::new(&mut rng, model, filter, &prior)?.with_failures(failures)?;
         centre = centre.with_false_alarms(ALARMS)?;
         if world.is_learning && purpose != Use::Comparison {
             let learning = NoiseLearning {
@@ -233,6 +158,8 @@ impl<const D: usize> Centre<D> {
             members: Vec::new(),
             purpose,
             period: world.period,
+            is_cut: world.is_cut,
+            zero: world.zero,
             rng,
             world: model,
             kept: world.is_smoothed.then(Vec::new),
@@ -279,7 +206,7 @@ impl<const D: usize> Centre<D> {
     }
 }
 
-impl<const D: usize> Estimator for Centre<D> {
+impl<const D: usize, F: StateFilter<D>> Estimator for Centre<D, F> {
     fn join(&mut self, seat: Seat) -> Result<(), Failure> {
         let sends = if self.purpose == Use::Comparison {
             Report::Value
@@ -347,7 +274,10 @@ impl<const D: usize> Estimator for Centre<D> {
             Event::NoiseOverstated => ("noise overstated", None),
             _ => ("reacquired", None),
         });
-        let events: Vec<_> = events.collect();
+        // Alarms are about values that come whatever they are, not about those that were sent because they are far from the last.
+        let is_meant =
+            |event: &(&'static str, Option<usize>)| !self.is_cut || !matches!(event.0, "lost" | "noise overstated");
+        let events: Vec<_> = events.filter(is_meant).collect();
         let rejected = events.iter().filter(|(event, _)| *event == "rejected").count();
         let belief = self.centre.estimate();
         if let Some(kept) = &mut self.kept {
@@ -361,7 +291,7 @@ impl<const D: usize> Estimator for Centre<D> {
             });
         }
         Ok(Step {
-            estimate: moments(&belief),
+            estimate: moments(&belief, self.zero),
             bits,
             reports,
             rejected,
@@ -384,6 +314,6 @@ impl<const D: usize> Estimator for Centre<D> {
 
     fn smoothed(&self, lag: Option<f64>) -> Result<Vec<Vec<(f64, f64)>>, Failure> {
         let beliefs = smooth(&self.world, self.kept.as_deref().unwrap_or_default(), lag)?;
-        Ok(beliefs.iter().map(moments).collect())
+        Ok(beliefs.iter().map(|belief| moments(belief, self.zero)).collect())
     }
 }

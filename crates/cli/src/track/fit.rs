@@ -1,6 +1,7 @@
 //! The task `fit`: calibration from a whole table.
 
 use super::applied::{Found, Sensor};
+use super::first::values_of;
 use super::rows::{Instant, Instants, Kind, Said};
 use crate::Ending;
 use crate::bounds::PerColumn;
@@ -10,12 +11,13 @@ use crate::numbers::above_zero;
 use crate::output;
 use fewbits_filters::calibration::{self, Reading};
 use fewbits_filters::fit::{Fit, Quantity, Request, fit};
+use fewbits_recipes::rounding;
 use fewbits_table::Side;
 
 /// Runs the task.
 pub(crate) fn run(options: &FitOptions) -> Result<Ending, Error> {
     let kind = Kind {
-        by: options.by.clone(),
+        by: options.table.by.clone(),
         ..Kind::default()
     };
     let mut instants = Instants::open(&options.table, &kind)?;
@@ -58,8 +60,14 @@ pub(crate) fn run(options: &FitOptions) -> Result<Ending, Error> {
         what: "the table cannot be fitted",
         source: Box::new(source),
     };
-    let readings = readings(&rows, &bits, &names, instants.file())?;
-    let found = fit(&readings, names.len(), &request).map_err(refused)?;
+    let mut readings = readings(&rows, &bits, &names, instants.file())?;
+    let mut found = fit(&readings, names.len(), &request).map_err(refused)?;
+    let steps = steps(&rows, &found, &bits);
+    if steps.iter().any(Option::is_some) {
+        // Rounding is no noise: what is looked for is the noise before it.
+        readings.iter_mut().for_each(|instant| round(instant, &steps));
+        found = fit(&readings, names.len(), &request).map_err(refused)?;
+    }
     let stored = stored(&found, &names, &bits);
     if let Some(path) = &options.output {
         output::text(Some(path), &(serde_json::to_string_pretty(&stored)? + "\n"))?;
@@ -67,9 +75,33 @@ pub(crate) fn run(options: &FitOptions) -> Result<Ending, Error> {
     if options.json {
         output::json(&stored)?;
     } else {
-        output::print(&page(&found, &names, &bits, readings.len()))?;
+        output::print(&page(&found, &names, (&bits, &steps), readings.len()))?;
     }
     Ok(Ending::Good)
+}
+
+/// The step to which each sensor rounds, where it is coarser than its noise.
+fn steps(rows: &[Instant], found: &Fit, bits: &[usize]) -> Vec<Option<f64>> {
+    let of = |sensor: usize| {
+        let noise = found.model.sensors[sensor].noise;
+        let is_value = !bits.contains(&sensor);
+        is_value
+            .then(|| rounding::coarse_step(&values_of(rows, sensor), noise))
+            .flatten()
+    };
+    (0..found.model.sensors.len()).map(of).collect()
+}
+
+/// Values of sensors that round, as cells.
+fn round(instant: &mut calibration::Instant, steps: &[Option<f64>]) {
+    for (sensor, reading) in &mut instant.values {
+        if let (Some(step), Some(value)) = (steps[*sensor], reading.value()) {
+            *reading = Reading::Within {
+                lower: value - 0.5 * step,
+                upper: value + 0.5 * step,
+            };
+        }
+    }
 }
 
 /// Cells as readings; a bit says on which side of zero the measurement is.
@@ -172,7 +204,7 @@ fn stored(found: &Fit, names: &[String], bits: &[usize]) -> Found {
     }
 }
 
-fn page(found: &Fit, names: &[String], bits: &[usize], rows: usize) -> String {
+fn page(found: &Fit, names: &[String], (bits, steps): (&[usize], &[Option<f64>]), rows: usize) -> String {
     let mut text = format!("{rows} rows; offsets are relative to {}\n\n", names[found.relative_to]);
     text += &format!("{:<50} {:>13} {:>13}\n", "", "value", "error");
     for one in &found.estimates {
@@ -189,6 +221,13 @@ fn page(found: &Fit, names: &[String], bits: &[usize], rows: usize) -> String {
     text.push('\n');
     for one in &found.refused {
         text += &format!("not found: {}: {}\n", title(one.quantity, names), one.reason);
+    }
+    for (name, step) in names.iter().zip(steps) {
+        if let Some(step) = step {
+            text += &format!(
+                "{name} is rounded to {step}: its values are taken as cells, its noise is that before rounding\n"
+            );
+        }
     }
     for one in &found.tests {
         let name = &names[one.sensor];

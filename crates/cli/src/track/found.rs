@@ -1,30 +1,25 @@
 //! What is found from the first rows: prior, change, noise of each sensor, steps of rounding.
 
-use super::centre::World;
 use super::first::{steepest, values, values_of};
 use super::meaning::Seat;
 use super::rows::{Instant, Said};
 use super::settings::Settings;
+use super::world::World;
 use crate::arguments::Model;
 use crate::error::Error;
 use crate::report::Report;
 use fewbits_filters::calibration::{self, Number, median, wrapped};
+use fewbits_recipes::rounding;
 
 /// Ratio of the standard deviation of a normal variable to the median of its distance from its mean.
 const DEVIATION_OF_MEDIAN: f64 = 1.4826;
-/// Standard deviation of rounding to a step, in steps.
-const ROUNDING: f64 = 0.29;
 /// Measurements and process in the first guess: the change is this share of the noise.
 const FIRST_CHANGE: f64 = 0.3;
 /// Median of the absolute value of a standard normal variable.
 const NORMAL_MEDIAN: f64 = 0.6745;
 const DO_NOT_VARY: &str = "the first rows do not vary, so it cannot be found from them";
-/// A sensor is taken to round if its noise with rounding is at most this many steps; its own noise is then at least this many.
-const COARSE: f64 = 0.75;
+/// The own noise of a sensor that rounds is at least this many steps.
 const LEAST_OWN: f64 = 0.05;
-/// Values from which a step of rounding is found, at least, and changes from one to the next among them.
-const FEWEST_OF_STEP: usize = 50;
-const FEWEST_CHANGES: usize = 4;
 /// A model with a slope is suggested if it explains the first rows better by so many nats.
 const SLOPING: f64 = 20.0;
 
@@ -33,22 +28,6 @@ pub(super) struct Unknown {
     pub(super) change: bool,
     pub(super) noise: bool,
     floor: f64,
-}
-
-/// The step to which values are rounded, if there is one: not finer than their decimals. Values that hardly ever change may all be multiples of
-/// a larger step by chance: theirs is that of their decimals.
-fn rounding(values: &[f64]) -> Option<f64> {
-    let decimals = (0..=9).map(|decimals| 0.1_f64.powi(decimals)).find(|unit| {
-        let off = |value: &f64| (value / unit - (value / unit).round()).abs();
-        values.iter().all(|value| off(value) < 1e-6)
-    });
-    let step = fewbits_adaptive::own_steps(values).into_iter().reduce(f64::min)?;
-    let is_known = values.windows(2).filter(|pair| pair[0] != pair[1]).count() >= FEWEST_CHANGES;
-    Some(match decimals {
-        Some(unit) if is_known => unit.max(step),
-        Some(unit) => unit.min(step),
-        None => step,
-    })
 }
 
 impl Settings {
@@ -89,7 +68,7 @@ impl Settings {
         // median.
         let typical = median(differences.clone()) / (NORMAL_MEDIAN * std::f64::consts::SQRT_2);
         let mean_size = differences.iter().sum::<f64>() / (differences.len() as f64).max(1.0);
-        let floor = ROUNDING * rounding(&flat).unwrap_or(0.0);
+        let floor = rounding::DEVIATION * rounding::step(&flat).unwrap_or(0.0);
         // The median is 0 if most values repeat the one before.
         let scale = [typical, mean_size, spread].into_iter().find(|size| *size > 0.0);
         let Some(scale) = scale.map(|scale| scale.max(floor)) else {
@@ -248,19 +227,19 @@ impl Settings {
     /// Finds which sensors round so coarsely that a value is a cell.
     pub(super) fn find_steps(&mut self, first: &[Instant], names: &[String]) {
         let step_of = |sensor: usize| {
-            let values = values_of(first, sensor);
-            let step = rounding(&values)?;
             let noise = self
                 .noises
                 .of(&names[sensor])
                 .unwrap_or_else(|| self.found.get(sensor).copied().unwrap_or(self.noise));
-            (values.len() >= FEWEST_OF_STEP && noise <= COARSE * step).then_some(step)
+            rounding::coarse_step(&values_of(first, sensor), noise)
         };
         let steps: Vec<Option<f64>> = (0..names.len()).map(step_of).collect();
         for (sensor, step) in steps.iter().enumerate() {
             // What was found includes the rounding; what was stated does not.
             if let (Some(step), Some(found)) = (step, self.found.get_mut(sensor)) {
-                let own = (*found * *found - ROUNDING * ROUNDING * step * step).max(0.0).sqrt();
+                let own = (*found * *found - rounding::DEVIATION * rounding::DEVIATION * step * step)
+                    .max(0.0)
+                    .sqrt();
                 *found = own.max(LEAST_OWN * step);
             }
         }

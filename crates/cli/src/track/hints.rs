@@ -1,8 +1,9 @@
 //! What the first rows of a table suggest that no option says.
 
+use super::first::{values as first_values, values_of};
 use super::rows::Instant;
 use crate::arguments::TrackOptions;
-use fewbits_filters::calibration::median;
+use fewbits_filters::calibration::{median, offsets};
 
 /// Periods of angles and their like.
 const PERIODS: [f64; 4] = [360.0, std::f64::consts::TAU, 400.0, 24.0];
@@ -23,13 +24,18 @@ const IRREGULAR: f64 = 3.0;
 /// An offset is told if it is this many of the sensor's deviations.
 const LARGE: f64 = 1.0;
 
+/// Values of which a detection limit is told, at least; a limit has one in so many of them, and more than so many times as many as any other value.
+const FEWEST_AT_LIMIT: usize = 30;
+const SHARE_AT_LIMIT: usize = 20;
+const MORE_AT_LIMIT: usize = 5;
+
 /// Hints, a line each.
 /// `noises` and `offsets`: of each sensor. `has_slope`: a slope explains the first rows far better.
 pub(super) fn hints(
     options: &TrackOptions,
     first: &[Instant],
     names: &[String],
-    (noises, offsets): (&[f64], &[f64]),
+    (noises, aligned): (&[f64], &[f64]),
     has_slope: bool,
 ) -> Vec<String> {
     let mut lines = Vec::new();
@@ -67,9 +73,13 @@ pub(super) fn hints(
             ));
         }
     }
+    lines.extend((0..names.len()).filter_map(|sensor| limit(options, &values_of(first, sensor), &names[sensor])));
+    if options.align.is_none() && options.period.is_none() {
+        lines.extend(apart(first, names));
+    }
     let large = |(sensor, offset): (usize, &f64)| offset.abs() > LARGE * noises[sensor];
-    if names.len() == 2 && offsets.iter().enumerate().any(large) {
-        let apart = (offsets[0] - offsets[1]).abs();
+    if names.len() == 2 && aligned.iter().enumerate().any(large) {
+        let apart = (aligned[0] - aligned[1]).abs();
         lines.push(format!(
             "the two sensors are {apart:.3} apart, and nothing says which is right: the level is taken to be in the middle, and may be {:.3} off",
             0.5 * apart
@@ -83,6 +93,56 @@ pub(super) fn hints(
         lines.push(format!("the first rows have a slope: {what}"));
     }
     lines
+}
+
+/// A value at an end of all values that many cells have, where others are hardly ever equal: a detection limit.
+fn limit(options: &TrackOptions, values: &[f64], name: &str) -> Option<String> {
+    if options.limits.is_some() || values.len() < FEWEST_AT_LIMIT {
+        return None;
+    }
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let (low, high) = (*sorted.first()?, *sorted.last()?);
+    let equal = |to: f64| values.iter().filter(|value| **value == to).count();
+    let runs = sorted.chunk_by(|one, other| one == other);
+    let most = runs
+        .filter(|run| run[0] != low && run[0] != high)
+        .map(<[f64]>::len)
+        .max()
+        .unwrap_or(0);
+    let is_limit = |count: usize| count * SHARE_AT_LIMIT >= values.len() && count > MORE_AT_LIMIT * most.max(1);
+    let (ends, many) = match (is_limit(equal(low)), is_limit(equal(high))) {
+        (true, true) if low < high => (format!("{low}..{high}"), equal(low) + equal(high)),
+        (true, false) => (format!("{low}.."), equal(low)),
+        (false, true) => (format!("..{high}"), equal(high)),
+        _ => return None,
+    };
+    Some(format!(
+        "{name} has {many} values at the end of its range: if it is a detection limit, say --limits {ends}; without it the bands are wrong"
+    ))
+}
+
+/// Sensors of constant offset from the others.
+fn apart(first: &[Instant], names: &[String]) -> Option<String> {
+    let found = offsets(&first_values(first, &[]), names.len(), None);
+    let is_apart = |sensor: &usize| {
+        let values = values_of(first, *sensor);
+        let steps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+        // Of the difference of two values, by its median.
+        let deviation = median(steps) / (0.6745 * std::f64::consts::SQRT_2);
+        values.len() >= FEWEST_ROWS && found[*sensor].abs() > LARGE * deviation
+    };
+    let apart: Vec<String> = (0..names.len())
+        .filter(is_apart)
+        .map(|sensor| format!("{} by {:.3}", names[sensor], found[sensor]))
+        .collect();
+    (!apart.is_empty()).then(|| {
+        format!(
+            "constant offsets from the others: {}: --align {} takes them off; without it they count as noise",
+            apart.join(", "),
+            first.len()
+        )
+    })
 }
 
 /// Whether the intervals between values differ by so much that values come when they have changed.

@@ -6,67 +6,24 @@ use super::report::{BAND, cells, first_cell, first_name, summarise};
 use super::rhythm::Rhythm;
 use super::rows::{Instant, Instants};
 use super::settings::Settings;
+use super::summary::{EventSummary, SensorSummary, Summary, lines};
 use crate::Ending;
 use crate::arguments::{Model, TrackOptions};
 use crate::error::{Error, Failure};
 use crate::output::{Shape, Sheet};
 use crate::plot::{Layer, Picture, Thinned};
-use serde::Serialize;
-
-/// What was found over the whole table.
-#[derive(Serialize)]
-struct Summary {
-    rows: u64,
-    /// Rows, or single reports, that say the same again and were dropped.
-    copies: u64,
-    reports: usize,
-    bits: usize,
-    bits_per_report: f64,
-    /// Assumed standard deviation of the noise of sensors for which none was given.
-    noise: f64,
-    /// Deviation of the level from its forecast and in how many seconds: what was supposed, and factor of its square at the end.
-    change: f64,
-    within: f64,
-    noise_scale: f64,
-    /// Root mean square difference from the estimates that use the same values unquantized.
-    difference_from_full_values: Option<f64>,
-    sensors: Vec<SensorSummary>,
-    events: Vec<EventSummary>,
-    /// What the first rows suggest that no option says.
-    hints: Vec<String>,
-}
-
-#[derive(Serialize)]
-struct SensorSummary {
-    name: String,
-    reports: usize,
-    gaps: usize,
-    /// Reports that were not used because they were too unlikely given the prediction and the others'.
-    rejected: u64,
-    /// Standard deviation of its noise, and offset, as supposed.
-    noise: f64,
-    offset: f64,
-    working: f64,
-    used: bool,
-}
-
-#[derive(Serialize)]
-struct EventSummary {
-    time: String,
-    event: &'static str,
-    sensor: Option<String>,
-}
 
 /// Largest number of events in the summary.
 const MAX_EVENTS: usize = 1000;
-/// Largest number of events that are printed.
-const PRINTED_EVENTS: usize = 12;
 
 struct Picked {
     seconds: f64,
     estimate: (f64, f64),
     full: Option<f64>,
 }
+
+/// An event, and its sensor.
+type Happened = (&'static str, Option<usize>);
 
 /// State of a run: both centres, and the counts for the summary.
 struct Run {
@@ -122,7 +79,21 @@ impl Run {
         })
     }
 
-    fn step(&mut self, instant: &Instant, names: &[String]) -> Result<Step, Error> {
+    /// Processes an instant without a row; its events.
+    fn between(&mut self, instant: &Instant) -> Result<Vec<Happened>, Error> {
+        let refused = |source: Failure| Error::Row {
+            file: self.file.clone(),
+            row: instant.row,
+            source,
+        };
+        if let Some(full) = &mut self.full {
+            full.step(instant).map_err(refused)?;
+        }
+        Ok(self.centre.step(instant).map_err(refused)?.events)
+    }
+
+    /// Processes a row, whose events come after those `before`.
+    fn step(&mut self, instant: &Instant, names: &[String], before: Vec<Happened>) -> Result<Step, Error> {
         let refused = |source: Failure| Error::Row {
             file: self.file.clone(),
             row: instant.row,
@@ -146,7 +117,8 @@ impl Run {
                 used: true,
             });
         }
-        let step = self.centre.step(instant).map_err(refused)?;
+        let mut step = self.centre.step(instant).map_err(refused)?;
+        step.events.splice(0..0, before);
         let full = self
             .full
             .as_mut()
@@ -271,13 +243,23 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
     let mut run = Run::new(options, settings, &instants)?;
     let mut sheet = Sheet::new(options.output.as_deref(), Shape::of(options.json), names.collect())?;
     let lag = options.smooth.as_deref().map(lag).transpose()?;
-    let mut rhythm = options.table.by.is_some().then(Rhythm::default);
-    let mut waiting = Vec::new();
+    // Silence of a sensor that sends on change is no missing report.
+    let has_rhythm = options.table.by.is_some() && options.silent_within.is_none();
+    let mut rhythm = has_rhythm.then(Rhythm::default);
+    let (mut waiting, mut between) = (Vec::new(), Vec::new());
     while let Some(mut instant) = instants.next()? {
+        if !instant.is_row {
+            between.extend(run.between(&instant)?);
+            // It has no row of its own.
+            if lag.is_some() {
+                waiting.push(None);
+            }
+            continue;
+        }
         if let Some(rhythm) = &mut rhythm {
             rhythm.fill(&mut instant);
         }
-        let step = run.step(&instant, &instants.names)?;
+        let step = run.step(&instant, &instants.names, std::mem::take(&mut between))?;
         turning.add(&instant);
         if !options.reports {
             let values = instant
@@ -290,7 +272,7 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
         let first = first_cell(&instants, instant.time.clone());
         let events = text(&step, &instants.names);
         if lag.is_some() {
-            waiting.push((first, step, events));
+            waiting.push(Some((first, step, events)));
         } else {
             sheet.write(cells(shown, first, &step.estimate, &step, events))?;
             if instants.is_live() {
@@ -303,7 +285,8 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
             what: "the estimates cannot be smoothed",
             source,
         })?;
-        for ((first, step, events), estimate) in waiting.into_iter().zip(&smoothed) {
+        for (row, estimate) in waiting.into_iter().zip(&smoothed) {
+            let Some((first, step, events)) = row else { continue };
             sheet.write(cells(shown, first, estimate, &step, events))?;
         }
     }
@@ -326,71 +309,4 @@ fn lag(text: &str) -> Result<Option<f64>, Error> {
     const EXPECTED: &str = "`all`, or a time, as `30s`";
     let time = humantime::parse_duration(text).map_err(|_| Error::option("--smooth", text, EXPECTED))?;
     Ok(Some(time.as_secs_f64()))
-}
-
-/// A number in four significant digits.
-fn short(number: f64) -> String {
-    let digits = 3 - number.abs().max(f64::MIN_POSITIVE).log10().floor() as i32;
-    match usize::try_from(digits) {
-        Ok(decimals) if decimals <= 8 => format!("{number:.decimals$}"),
-        _ => format!("{number:.3e}"),
-    }
-}
-
-/// The noise of each sensor.
-fn noises(summary: &Summary) -> String {
-    let one = |sensor: &SensorSummary| format!("{} {}", sensor.name, short(sensor.noise));
-    let all: Vec<String> = summary.sensors.iter().take(PRINTED_EVENTS).map(one).collect();
-    let more = summary.sensors.len() - all.len();
-    let rest = if more > 0 {
-        format!(" and {more} more")
-    } else {
-        String::new()
-    };
-    format!("{}{rest}", all.join(", "))
-}
-
-fn lines(summary: &Summary) -> Vec<String> {
-    let mut lines = vec![
-        format!(
-            "{} rows, {} reports of {:.2} bits on average",
-            summary.rows, summary.reports, summary.bits_per_report
-        ),
-        format!(
-            "supposed: noise {}, change {} in {} s; learnt: {:.3} times that change",
-            noises(summary),
-            short(summary.change),
-            short(summary.within),
-            summary.noise_scale.sqrt()
-        ),
-    ];
-    if let Some(difference) = summary.difference_from_full_values {
-        lines.push(format!("estimates differ by {difference:.4} (root mean square) from those of values in full"));
-    }
-    lines.extend(summary.hints.iter().cloned());
-    if summary.copies > 0 {
-        lines.push(format!("{} copies of reports were dropped", summary.copies));
-    }
-    for sensor in summary.sensors.iter().filter(|sensor| sensor.rejected > 0) {
-        lines.push(format!(
-            "{}: {} of {} reports were too unlikely and not used",
-            sensor.name, sensor.rejected, sensor.reports
-        ));
-    }
-    for sensor in summary.sensors.iter().filter(|sensor| !sensor.used) {
-        let why = if sensor.working < 0.5 {
-            "it is silent"
-        } else {
-            "it contradicts the others (constant offsets: --align ROWS)"
-        };
-        lines.push(format!("{} is not used any more: {why}", sensor.name));
-    }
-    for event in summary.events.iter().take(PRINTED_EVENTS) {
-        let sensor = event.sensor.as_deref().unwrap_or("all sensors");
-        lines.push(format!("{}: {sensor}: {}", event.time, event.event));
-    }
-    if summary.events.len() > PRINTED_EVENTS {
-        lines.push(format!("and {} more events", summary.events.len() - PRINTED_EVENTS));
-    }
-    lines
 }

@@ -1,7 +1,10 @@
 //! A sensor's seat, and what the cells of its column mean.
 
 use super::rows::Said;
+use crate::error::Error;
+use crate::numbers::above_zero;
 use crate::report::Report;
+use fewbits_recipes::rounding;
 use fewbits_recipes::stated::StatedReading;
 use fewbits_table::Side;
 
@@ -45,13 +48,28 @@ impl Meaning {
     }
 }
 
-/// Standard deviation of rounding to a step, in steps.
-const ROUNDING: f64 = 0.288_675_134_594_812_9;
+/// The width of silence, and the seconds between two of the sensor's measurements if they are said: `0.5`, `0.5/60s`.
+pub(super) fn silence(text: &str) -> Result<(f64, Option<f64>), Error> {
+    const EXPECTED: &str = "a width above 0, or also how often the sensor measures, as `0.5/60s`";
+    let (width, time) = match text.split_once('/') {
+        Some((width, time)) => (width, Some(time)),
+        None => (text, None),
+    };
+    let refused = || Error::option("--silent-within", text, EXPECTED);
+    let seconds = time
+        .map(|time| humantime::parse_duration(time).map_err(|_| refused()))
+        .transpose()?
+        .map(|time| time.as_secs_f64());
+    if seconds.is_some_and(|seconds| seconds <= 0.0) {
+        return Err(refused());
+    }
+    Ok((above_zero("--silent-within", width, EXPECTED)?, seconds))
+}
 
 impl Seat {
     /// Standard deviation of the error of a value, rounding included.
     pub(super) fn usual(&self) -> f64 {
-        self.noise.hypot(ROUNDING * self.meaning.step.unwrap_or(0.0))
+        self.noise.hypot(rounding::DEVIATION * self.meaning.step.unwrap_or(0.0))
     }
 
     /// Whether its reports are values that state their meaning.

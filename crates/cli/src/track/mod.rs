@@ -37,8 +37,11 @@ mod ranges;
 mod report;
 mod rhythm;
 mod rows;
+mod samples;
 mod sensors;
 mod settings;
+mod summary;
+mod world;
 
 use crate::Ending;
 use crate::arguments::{FitOptions, Model, RangesOptions, TrackOptions};
@@ -54,7 +57,7 @@ pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {
             reason: "--anchors says where ranges are measured from",
         }),
         _ => {
-            let instants = Instants::open(&options.table, &Kind::of(options))?;
+            let instants = Instants::open(&options.table, &Kind::of(options)?)?;
             let (options, corrections) = applied::applied(options, &instants.names)?;
             level::run(&options, instants.corrected(corrections))
         }

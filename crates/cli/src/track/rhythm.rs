@@ -2,12 +2,17 @@
 
 use super::rows::Instant;
 use fewbits_filters::calibration::median;
+use std::collections::VecDeque;
 
-/// Number of intervals from which the usual one is found, at least and at most.
+/// Number of last intervals from which the usual one is found, at least and at most.
 const FEWEST: usize = 4;
 const MOST: usize = 32;
 /// A report is missing if it is this many usual intervals since the last.
 const LATE: f64 = 1.5;
+/// Intervals up to this many medians are regular, and the usual one is their median. Otherwise it is the longest of the last.
+const REGULAR: f64 = 1.5;
+/// After so many missing reports the sensor was silent, and the interval is not a usual one.
+const SILENT: u32 = 2;
 
 /// The usual interval of each sensor.
 #[derive(Debug, Default)]
@@ -20,7 +25,16 @@ struct Sensor {
     /// Time of the last report, and of the last report or missing report.
     reported: Option<f64>,
     counted: f64,
-    intervals: Vec<f64>,
+    missing: u32,
+    intervals: VecDeque<f64>,
+}
+
+impl Sensor {
+    fn usual(&self) -> f64 {
+        let longest = self.intervals.iter().copied().fold(0.0, f64::max);
+        let middle = median(self.intervals.iter().copied().collect());
+        if longest <= REGULAR * middle { middle } else { longest }
+    }
 }
 
 impl Rhythm {
@@ -37,15 +51,19 @@ impl Rhythm {
                     .reported
                     .map(|last| now - last)
                     .filter(|interval| *interval > 0.0);
-                if sensor.intervals.len() < MOST {
+                if sensor.missing < SILENT {
                     sensor.intervals.extend(interval);
                 }
-                (sensor.reported, sensor.counted) = (Some(now), now);
+                while sensor.intervals.len() > MOST {
+                    sensor.intervals.pop_front();
+                }
+                (sensor.reported, sensor.counted, sensor.missing) = (Some(now), now, 0);
             } else if sensor.intervals.len() >= FEWEST {
-                let usual = median(sensor.intervals.clone());
+                let usual = sensor.usual();
                 if now - sensor.counted > LATE * usual {
                     // Others may report less often: of several missing reports one counts.
                     sensor.counted += usual * ((now - sensor.counted) / usual).floor();
+                    sensor.missing += 1;
                     instant.reports.push((number, None));
                 }
             }

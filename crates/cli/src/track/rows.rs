@@ -2,6 +2,8 @@
 
 use super::applied::Correction;
 use super::late::Late;
+use super::meaning::silence;
+use super::samples::Samples;
 use crate::arguments::{TableOptions, TrackOptions};
 use crate::clock;
 use crate::error::Error;
@@ -30,17 +32,21 @@ pub(super) struct Kind {
     pub(super) is_filled: bool,
     /// Seconds by which a row may be late.
     pub(super) late: f64,
+    /// Seconds between measurements of a sensor that sends some of them.
+    pub(super) sampled: Option<f64>,
 }
 
 impl Kind {
-    pub(super) fn of(options: &TrackOptions) -> Self {
-        Self {
+    pub(super) fn of(options: &TrackOptions) -> Result<Self, Error> {
+        let silent = options.silent_within.as_deref().map(silence).transpose()?;
+        Ok(Self {
+            sampled: silent.and_then(|(_, seconds)| seconds),
             by: options.table.by.clone(),
             accuracy: options.accuracy_column.clone(),
             threshold: options.threshold_column.clone(),
             is_filled: options.silent_within.is_some(),
             late: options.late.map_or(0.0, |late| late.as_secs_f64()),
-        }
+        })
     }
 
     fn columns(&self) -> impl Iterator<Item = &String> {
@@ -66,6 +72,8 @@ pub(super) struct Instant {
     pub(super) time: String,
     /// The first row of this time.
     pub(super) row: u64,
+    /// Whether it is in the table; otherwise sensors measured then and sent nothing.
+    pub(super) is_row: bool,
     /// Index of each sensor, and what it reported; `None` if the cell is empty.
     pub(super) reports: Vec<(usize, Option<f64>)>,
     /// What the rows of these reports say of them, as many.
@@ -102,6 +110,8 @@ pub(super) struct Instants {
     pending: Option<Instant>,
     /// Rows that wait for those that are late.
     late: Late,
+    /// Measurements between rows.
+    samples: Option<Samples>,
 }
 
 impl Instants {
@@ -176,6 +186,7 @@ impl Instants {
             ahead: VecDeque::new(),
             pending: None,
             late: Late::new(kind.late),
+            samples: kind.sampled.map(Samples::new),
         })
     }
 
@@ -202,7 +213,7 @@ impl Instants {
     /// Reads up to `count` instants without consuming them.
     pub(super) fn peek(&mut self, count: usize) -> Result<&VecDeque<Instant>, Error> {
         while self.ahead.len() < count {
-            match self.read()? {
+            match self.read_with_samples()? {
                 Some(instant) => self.ahead.push_back(instant),
                 None => break,
             }
@@ -214,8 +225,28 @@ impl Instants {
     pub(super) fn next(&mut self) -> Result<Option<Instant>, Error> {
         match self.ahead.pop_front() {
             Some(instant) => Ok(Some(instant)),
-            None => self.read(),
+            None => self.read_with_samples(),
         }
+    }
+
+    /// Whether instants without a row are among those that are read.
+    pub(super) fn has_samples(&self) -> bool {
+        self.samples.is_some()
+    }
+
+    fn read_with_samples(&mut self) -> Result<Option<Instant>, Error> {
+        let Some(mut samples) = self.samples.take() else {
+            return self.read();
+        };
+        let mut found = samples.next();
+        if found.is_none()
+            && let Some(instant) = self.read()?
+        {
+            samples.add(instant);
+            found = samples.next();
+        }
+        self.samples = Some(samples);
+        Ok(found)
     }
 
     fn read(&mut self) -> Result<Option<Instant>, Error> {
@@ -355,6 +386,7 @@ impl Instants {
             seconds,
             time,
             row: self.table.row(),
+            is_row: true,
             said: places.iter().map(said).collect(),
             reports,
         }))

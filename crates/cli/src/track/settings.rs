@@ -1,24 +1,26 @@
 //! Settings of the level and its sensors, from options and first rows.
 
-use super::centre::World;
 use super::first::{values, values_of};
 use super::hints::{circle, hints};
-use super::meaning::{Meaning, Seat};
+use super::meaning::{Meaning, Seat, silence};
 use super::report::Circle;
 use super::rows::{Instant, Instants};
 use super::sensors;
+use super::world::World;
 use crate::arguments::{Model, Switch, TrackOptions};
 use crate::bounds::PerColumn;
 use crate::error::Error;
 use crate::numbers::{above_zero, mean_and_deviation, number};
 use crate::report::Report;
-use fewbits_filters::calibration::{median, offsets};
+use fewbits_filters::calibration::{median, offsets, shift_deviation};
 
 /// Number of rows that are examined before the first estimate.
 const FIRST_ROWS: usize = 200;
 /// The same of a table of single reports: for each sensor, and at most.
 const FIRST_REPORTS: usize = 200;
 const MOST_FIRST: usize = 2000;
+/// At most if measurements without a row are among them.
+const MOST_SAMPLES: usize = 20_000;
 /// Values of a sensor from which no further rows are read before the first estimate.
 const FEWEST_VALUES: usize = 30;
 /// Smallest and largest assumed share of lost reports.
@@ -131,11 +133,13 @@ impl Settings {
         }
         if !known {
             // Where most cells are empty, so few rows have too few values.
-            while rows < MOST_FIRST
-                && instants.peek(rows)?.len() == rows
-                && values_in(instants.peek(rows)?) < FEWEST_VALUES
-            {
-                rows = (2 * rows).min(MOST_FIRST);
+            let most = if instants.has_samples() {
+                MOST_SAMPLES
+            } else {
+                MOST_FIRST
+            };
+            while rows < most && instants.peek(rows)?.len() == rows && values_in(instants.peek(rows)?) < FEWEST_VALUES {
+                rows = (2 * rows).min(most);
             }
         }
         let first: Vec<Instant> = instants.peek(rows)?.iter().cloned().collect();
@@ -174,8 +178,9 @@ impl Settings {
         let within = options
             .silent_within
             .as_deref()
-            .map(|text| above_zero("--silent-within", text, "a width above 0"))
-            .transpose()?;
+            .map(silence)
+            .transpose()?
+            .map(|(width, _)| width);
         let mut settings = Self {
             steps: Vec::new(),
             has_slope: false,
@@ -206,6 +211,9 @@ impl Settings {
                 sensors,
                 steepest: 0.0,
                 is_smoothed: options.smooth.is_some(),
+                // Of single reports nothing tells the noise, and a wrong one misleads an exact filter more.
+                is_cut: within.is_some() && (asked_noise.is_some() || options.table.by.is_none()),
+                zero: 0.0,
                 is_learning: options
                     .learning
                     .map_or(asked_change.is_none(), |learning| learning == Switch::On),
@@ -237,6 +245,12 @@ impl Settings {
                 Ok(())
             }
         };
+        if instants.has_samples() && asked_noise.is_none() {
+            return Err(Error::Needed {
+                option: "--noise",
+                reason: "values that a sensor sends only on change do not tell it",
+            });
+        }
         can_look("--noise", asked_noise.is_some())?;
         can_look("--change", asked_change.is_some())?;
         can_look("--prior", asked_prior.is_some())?;
@@ -270,6 +284,12 @@ impl Settings {
             .map(|(sensor, name)| settings.seat(sensor, name).noise)
             .collect();
         let apart = (noises.as_slice(), settings.offsets.as_slice());
+        if let Some(rows) = options.align {
+            // Of the level each sensor tells a share.
+            let weights: Vec<f64> = noises.iter().map(|noise| 1.0 / (noise * noise)).collect();
+            let first = values(&first[..rows.min(first.len())], &[]);
+            settings.world.zero = shift_deviation(&first, &weights, period);
+        }
         let found = hints(options, &first, &instants.names, apart, settings.has_slope);
         settings.hints.extend(found);
         Ok(settings)

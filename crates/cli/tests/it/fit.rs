@@ -81,3 +81,34 @@ fn what_a_table_cannot_tell_is_refused_with_the_reason() {
     let words = ["track", "t.csv", "--columns", "right", "--settings", "x.json"];
     assert!(refused(folder.path(), &words, b"").contains("no file of `fewbits fit"));
 }
+
+/// Defects: `--by` was an option of two structures, of which the one that was not filled was read, so that such a table was refused; rounding was taken for noise.
+#[test]
+fn single_readings_and_rounded_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let numbers = &mut Numbers(9);
+    let (mut level, mut table, mut rounded) = (20.0, "time,name,value\n".to_owned(), "a,b\n".to_owned());
+    for row in 0..600 {
+        level += 0.1 * numbers.normal();
+        let (a, b) = (level + 0.2 * numbers.normal(), level + 3.0 + 0.6 * numbers.normal());
+        table +=
+            &format!("{},{},{:.4}\n", 7 * row, if row % 3 == 0 { "b" } else { "a" }, if row % 3 == 0 { b } else { a });
+        rounded += &format!("{:.0},{:.3}\n", level + 0.2 * numbers.normal(), b);
+    }
+    let words = ["fit", "-", "--by", "name", "--json"];
+    let found: serde_json::Value = serde_json::from_slice(&good(folder.path(), &words, table.as_bytes())).unwrap();
+    let near = |name: &str, truth: f64, found: &serde_json::Value| {
+        let all = found["estimates"].as_array().unwrap();
+        let one = all.iter().find(|one| one[0] == name).unwrap();
+        let off = (one[1].as_f64().unwrap() - truth) / one[2].as_f64().unwrap();
+        assert!(off.abs() < 4.0, "{name}: {one}");
+    };
+    near("noise of a", 0.2, &found);
+    near("noise of b", 0.6, &found);
+    near("offset of b", 3.0, &found);
+    let words = ["fit", "-", "--json"];
+    let found: serde_json::Value = serde_json::from_slice(&good(folder.path(), &words, rounded.as_bytes())).unwrap();
+    near("noise of a", 0.2, &found);
+    let page = text(&good(folder.path(), &["fit", "-"], rounded.as_bytes()));
+    assert!(page.contains("a is rounded to 1") && !page.contains("b is rounded"), "{page}");
+}

@@ -178,12 +178,12 @@ fn single_reports(seed: u64) -> (String, Vec<f64>) {
     (table, truth)
 }
 
-/// Defect: of a sensor that sends on change, rows that are not there said nothing in a table of single reports.
-///
-/// A value that has just crossed the width is off by its noise, always outwards, so the bands of these rows hold less than they say.
+/// Defect: of a sensor that sends on change, rows that are not there said nothing in a table of single reports. Where it is said how often the
+/// sensors measure, what they did not send counts at the times at which they did not, and the bands hold what they say. Squared errors
+/// are not compared: now and then a right value is rejected as wild, and its row is far off.
 #[test]
 fn silence_between_single_reports_says_something() {
-    let (mut squared, mut kept) = ([0.0_f64; 2], [0; 2]);
+    let (mut squared, mut kept) = ([0.0_f64; 3], [0_usize; 3]);
     let mut count = 0;
     for seed in 44..50 {
         let (table, truth) = single_reports(seed);
@@ -191,7 +191,8 @@ fn silence_between_single_reports_says_something() {
         let (plain, summary) = tracked(&table, &["--by", "name"]);
         assert!(has_hint(&summary, "sends on change"), "{summary}");
         let (silent, _) = tracked(&table, &["--by", "name", "--silent-within", "0.3"]);
-        for (which, rows) in [plain, silent].iter().enumerate() {
+        let (sampled, _) = tracked(&table, &["--by", "name", "--silent-within", "0.3/60s", "--noise", "0.03"]);
+        for (which, rows) in [plain, silent, sampled].iter().enumerate() {
             assert_eq!(rows.len(), truth.len());
             for (row, level) in rows.iter().zip(&truth) {
                 squared[which] += (of(row, "level") - level).powi(2);
@@ -200,10 +201,66 @@ fn silence_between_single_reports_says_something() {
         }
     }
     println!("squared errors {squared:?}, {kept:?} of {count} held");
-    assert!(
-        squared[1] < squared[0] && kept[1] > kept[0] && 3 * kept[1] > 2 * count,
-        "{squared:?} {kept:?} of {count}"
-    );
+    assert!(squared[1] < squared[0] && kept[1] > kept[0], "{squared:?} {kept:?} of {count}");
+    let share = kept[2] as f64 / count as f64;
+    assert!((0.92..=0.98).contains(&share), "{squared:?} {kept:?} of {count}");
+}
+
+/// Defect: a sensor that reports at random times, or of which one report in five is lost, was dead again and again.
+#[test]
+fn irregular_reports_are_no_silence() {
+    let mut numbers = Numbers(77);
+    let (mut table, mut time, mut level) = ("time,name,t\n".to_owned(), 0.0, 20.0);
+    for row in 0..3000 {
+        let passed: f64 = -numbers.uniform().max(1e-12).ln();
+        time += passed;
+        level += 0.1 * passed.sqrt() * numbers.normal();
+        let name = ["a", "a", "b"][row * 7 % 3];
+        table += &format!("{time:.3},{name},{:.3}\n", level + 0.3 * numbers.normal());
+    }
+    let (_, summary) = tracked(&table, &["--by", "name"]);
+    let dead = |summary: &Value| {
+        let events = summary["events"].as_array().unwrap();
+        events.iter().filter(|one| one["event"] == "dead").count()
+    };
+    assert!(dead(&summary) <= 1, "{summary}");
+    let (mut table, mut level) = ("time,name,t\n".to_owned(), 20.0);
+    for row in 0..1500 {
+        level += 0.1 * numbers.normal();
+        for name in ["a", "b"] {
+            // The second one stops for good.
+            if numbers.uniform() < 0.8 && !(name == "b" && row > 1000) {
+                table += &format!("{},{name},{:.3}\n", 10 * row, level + 0.3 * numbers.normal());
+            }
+        }
+    }
+    let (_, summary) = tracked(&table, &["--by", "name"]);
+    let found = dead(&summary);
+    let last = summary["events"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .rfind(|one| one["event"] == "dead")
+        .cloned();
+    assert!((1..=2).contains(&found) && last.is_some_and(|one| one["sensor"] == "b"), "{summary}");
+}
+
+/// Defect: constant offsets were taken for noise, and a detection limit for values, and nothing said so.
+#[test]
+fn offsets_and_limits_are_told() {
+    let mut numbers = Numbers(78);
+    let (mut table, mut level) = ("a,b,c\n".to_owned(), 20.0_f64);
+    for _ in 0..300 {
+        level += 0.1 * numbers.normal();
+        let low = (level + 0.3 * numbers.normal()).max(20.0);
+        table +=
+            &format!("{:.4},{:.4},{low:.4}\n", level + 0.3 * numbers.normal(), level + 2.0 + 0.3 * numbers.normal());
+    }
+    let (_, summary) = tracked(&table, &[]);
+    assert!(has_hint(&summary, "b by ") && has_hint(&summary, "--align"), "{summary}");
+    assert!(has_hint(&summary, "--limits 20.."), "{summary}");
+    let (_, summary) = tracked(&table, &["--columns", "a"]);
+    assert!(!has_hint(&summary, "--limits") && !has_hint(&summary, "--align"), "{summary}");
 }
 
 /// Rows out of order are taken in within `--late`, with the estimates of the sorted table; later ones are refused with what mends it.

@@ -125,8 +125,8 @@ fn silence_of_a_sensor_that_sends_on_change_says_something() {
     let last_value = (squares / 1400.0).sqrt();
     assert!(error < 1.02 * last_value && (0.92..=0.98).contains(&held), "{error} {last_value} {held}");
     // Without it an empty cell says nothing, and the band grows.
-    let (without, _) = against(&table, &truth, &known);
-    assert!(error < without, "{error} {without}");
+    let (without, wide) = against(&table, &truth, &known);
+    assert!(error < 1.02 * without && wide > held, "{error} {without} {wide} {held}");
 }
 
 #[test]

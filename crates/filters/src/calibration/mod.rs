@@ -11,7 +11,7 @@
 mod offsets;
 mod reading;
 
-pub use offsets::{median, offsets};
+pub use offsets::{median, offsets, shift_deviation};
 pub use reading::Reading;
 
 use crate::{Error, assumed_density};
@@ -229,7 +229,7 @@ where
                 let (mean, covariance) = (*belief.mean(), *belief.covariance());
                 let said = reading.said(mean[0], covariance[(0, 0)], noises[*sensor], self.period)?;
                 let deviation = said.variance.sqrt();
-                let (right, wild) = ((1.0 - WILD) * said.log.exp(), reading.wild(WILD, range));
+                let (right, wild) = ((1.0 - WILD) * said.density, reading.wild(WILD, range));
                 total += (right + wild).ln();
                 // The moments of the mixture of "it is wild" and "it is not".
                 let weight = right / (right + wild);

@@ -17,6 +17,34 @@ const ALIGNMENTS: usize = 20;
 /// Values that are farther from the mean than this many of their median distances are left out.
 const FARTHEST: f64 = 6.0;
 
+/// Stretches of the instants, of which each is left out once.
+const STRETCHES: usize = 10;
+
+/// Standard deviation of what errors of the [`offsets`] shift a level, of which each sensor tells a share in proportion to its weight (one over the
+/// variance of its noise): found by leaving out one stretch of the instants after the other (jackknife). It is the same in all rows, so it belongs to
+/// the band of each. 0 of one sensor.
+pub fn shift_deviation(instants: &[Instant], weights: &[f64], period: Option<f64>) -> f64 {
+    let sum: f64 = weights.iter().sum();
+    let count = STRETCHES.min(instants.len());
+    if count < 2 || weights.len() < 2 || sum <= 0.0 || !sum.is_finite() {
+        return 0.0;
+    }
+    let without = |stretch: usize| {
+        let (begin, end) = (stretch * instants.len() / count, (stretch + 1) * instants.len() / count);
+        let rest = [&instants[..begin], &instants[end..]].concat();
+        let found = offsets(&rest, weights.len(), period);
+        found
+            .iter()
+            .zip(weights)
+            .map(|(offset, weight)| offset * weight / sum)
+            .sum::<f64>()
+    };
+    let shifts: Vec<f64> = (0..count).map(without).collect();
+    let mean = shifts.iter().sum::<f64>() / count as f64;
+    let squares: f64 = shifts.iter().map(|shift| (shift - mean) * (shift - mean)).sum();
+    (squares * (count - 1) as f64 / count as f64).sqrt()
+}
+
 /// The constant offset of each sensor among `sensors`, from the instants at which several measured. Their median is zero: nothing says what
 /// all have in common. A wild value does not move them. A sensor that never measured together with others has offset zero.
 pub fn offsets(instants: &[Instant], sensors: usize, period: Option<f64>) -> Vec<f64> {

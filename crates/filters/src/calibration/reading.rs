@@ -49,6 +49,14 @@ impl Reading {
         }
     }
 
+    /// The value, or the middle of a cell of which both ends are finite.
+    pub(crate) fn middle(&self) -> Option<f64> {
+        match self {
+            Self::Value { value, .. } => Some(*value),
+            Self::Within { lower, upper } => Some(0.5 * (lower + upper)).filter(|middle| middle.is_finite()),
+        }
+    }
+
     /// The finite numbers that it states.
     pub(super) fn numbers(&self) -> impl Iterator<Item = f64> {
         let both = match *self {
@@ -74,7 +82,7 @@ impl Reading {
         Ok(())
     }
 
-    /// What it says of a measurement, under a prediction of this mean and variance without noise: `ln` of the density or probability, mean and
+    /// What it says of a measurement, under a prediction of this mean and variance without noise: the density or probability, mean and
     /// variance of the measurement afterwards in the prediction's deviations, noise included, and that variance.
     pub(crate) fn said(&self, mean: f64, variance: f64, noise: f64, period: Option<f64>) -> Option<Said> {
         match *self {
@@ -82,9 +90,9 @@ impl Reading {
                 let noise = deviation.unwrap_or(noise);
                 let variance = variance + noise * noise;
                 let score = wrapped(value - mean, period) / variance.sqrt();
-                let log = -0.5 * (score * score + (std::f64::consts::TAU * variance).ln());
+                let density = (-0.5 * score * score).exp() / (std::f64::consts::TAU * variance).sqrt();
                 Some(Said {
-                    log,
+                    density,
                     score,
                     left: 0.0,
                     variance,
@@ -103,7 +111,7 @@ impl Reading {
                 };
                 let found = truncated_moments((lower + shift) / deviation, (upper + shift) / deviation).ok()?;
                 Some(Said {
-                    log: found.log_probability,
+                    density: found.log_probability.exp(),
                     score: found.mean,
                     left: found.variance,
                     variance,
@@ -123,8 +131,8 @@ impl Reading {
 
 /// Moments of a measurement given a reading of it.
 pub(crate) struct Said {
-    /// `ln` of its density or probability.
-    pub(crate) log: f64,
+    /// Its density or probability.
+    pub(crate) density: f64,
     /// Mean of the innovation afterwards, and its variance, in the prediction's deviations.
     pub(crate) score: f64,
     pub(crate) left: f64,

@@ -10,9 +10,12 @@
 //! What the readings cannot tell is refused with the reason, never guessed: nothing says what all sensors have in common, so without a reference
 //! faults are relative to one of the sensors.
 
+mod errors;
+mod filter;
 mod model;
 mod parameters;
 mod problem;
+mod readings;
 mod search;
 mod tests_of_fit;
 
@@ -99,9 +102,26 @@ pub fn fit_watched(
 }
 
 fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn Fn() -> bool) -> Result<Fit, Error> {
+    Scale::of(instants, sensors)?;
+    // What does not vary says nothing of the level, and would be taken for it.
+    let useless: Vec<Option<Refusal>> = (0..sensors)
+        .map(|sensor| useless(instants, sensor).filter(|_| request.reference != Some(sensor)))
+        .collect();
+    let of_use = |instant: &Instant| Instant {
+        seconds: instant.seconds,
+        values: instant
+            .values
+            .iter()
+            .filter(|(sensor, _)| useless[*sensor].is_none())
+            .copied()
+            .collect(),
+    };
+    let all = instants;
+    let kept: Vec<Instant> = all.iter().map(of_use).collect();
+    let instants = kept.as_slice();
     let scale = Scale::of(instants, sensors)?;
     let series: Vec<Vec<(f64, f64)>> = (0..sensors).map(|sensor| values_of(instants, sensor)).collect();
-    let (relative_to, mut refused) = anchor(&series, instants, request)?;
+    let (relative_to, mut refused) = anchor(&series, all, request)?;
     let start = start(&series, instants, &scale, relative_to, request)?;
     let mut free = vec![Quantity::Change];
     let reason = |quantity, reason: &str| Refusal {
@@ -109,16 +129,8 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
         reason: reason.to_owned(),
     };
     for sensor in 0..sensors {
-        let count = instants
-            .iter()
-            .flat_map(|instant| &instant.values)
-            .filter(|one| one.0 == sensor);
-        if count.count() < FEWEST {
-            refused.push(reason(Quantity::Noise(sensor), "it has fewer than 12 readings"));
-            continue;
-        }
-        if is_constant(instants, sensor) {
-            refused.push(reason(Quantity::Bias(sensor), "its readings are all alike"));
+        if let Some(reason) = &useless[sensor] {
+            refused.push(reason.clone());
             continue;
         }
         if request.noises.get(sensor).copied().flatten().is_none() {
@@ -150,7 +162,7 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
         problem.try_walks(relative_to, &mut refused);
     }
     if request.slope {
-        problem.try_without_slopes(&mut refused);
+        problem.try_without_slopes(request.walk, &mut refused);
     }
     let estimates = problem.errors(&mut refused);
     let (log_likelihood, residuals) = problem.model.log_likelihood(instants)?;
@@ -172,23 +184,36 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
 fn values_of(instants: &[Instant], sensor: usize) -> Vec<(f64, f64)> {
     let of = |instant: &Instant| -> Vec<(f64, f64)> {
         let own = instant.values.iter().filter(|(other, _)| *other == sensor);
-        own.filter_map(|(_, reading)| Some((instant.seconds, reading.value()?)))
+        own.filter_map(|(_, reading)| Some((instant.seconds, reading.middle()?)))
             .collect()
     };
     instants.iter().flat_map(of).collect()
 }
 
-fn is_constant(instants: &[Instant], sensor: usize) -> bool {
+/// Why nothing is found from a sensor's readings, if so: they are left out.
+fn useless(instants: &[Instant], sensor: usize) -> Option<Refusal> {
     let mut own = instants
         .iter()
         .flat_map(|instant| &instant.values)
         .filter(|(other, _)| *other == sensor);
+    let count = own.clone().count();
     let first = own.next();
-    own.all(|one| Some(one) == first)
+    let (quantity, reason) = if count < FEWEST {
+        (Quantity::Noise(sensor), "it has fewer than 12 readings, which are left out")
+    } else if own.all(|one| Some(one) == first) {
+        (Quantity::Bias(sensor), "its readings are all alike, and left out")
+    } else {
+        return None;
+    };
+    Some(Refusal {
+        quantity,
+        reason: reason.to_owned(),
+    })
 }
 
 /// The sensor to which all else is relative, and what cannot be found therefore.
-fn anchor(series: &[Vec<(f64, f64)>], instants: &[Instant], request: &Request) -> Result<(usize, Vec<Refusal>), Error> {
+/// `all`: with the readings that are left out.
+fn anchor(series: &[Vec<(f64, f64)>], all: &[Instant], request: &Request) -> Result<(usize, Vec<Refusal>), Error> {
     let of_values = |sensor: &usize| series[*sensor].len() >= FEWEST;
     if let Some(reference) = request.reference {
         if reference >= series.len() || !of_values(&reference) {
@@ -201,14 +226,15 @@ fn anchor(series: &[Vec<(f64, f64)>], instants: &[Instant], request: &Request) -
         .filter(of_values)
         .max_by_key(|sensor| series[*sensor].len())
     else {
-        if instants.iter().any(|instant| !instant.values.is_empty()) {
+        let mut readings = all.iter().flat_map(|instant| &instant.values).peekable();
+        if readings.peek().is_some() && readings.all(|(_, reading)| reading.middle().is_none()) {
             return refuse(
                 "readings",
-                "no sensor of at least 12 values",
+                "bits",
                 "a reference, or a sensor of values: bits alone leave unit and zero of the level unknown",
             );
         }
-        return refuse("readings", "none", "at least 12 values of a sensor");
+        return refuse("readings", "too few", "at least 12 values of a sensor that vary");
     };
     let mut refused = vec![(true, Quantity::Bias(first))];
     refused.extend([

@@ -1,7 +1,9 @@
 //! The level, its sensors, and the likelihood of what they said.
 
+use super::filter::{Filter, Steady, Step, Wandering};
+use super::readings::{Readings, Told};
 use crate::Error;
-use crate::calibration::{Instant, Reading};
+use crate::calibration::Instant;
 use fewbits_numerics::error::{finite, non_negative, positive, refuse};
 use serde::{Deserialize, Serialize};
 
@@ -9,6 +11,9 @@ use serde::{Deserialize, Serialize};
 const WILD: f64 = 1e-3;
 /// Deviation of an unknown first level in spreads of the values.
 const FIRST: f64 = 10.0;
+/// Products of densities stay between these.
+const TINY: f64 = 1e-100;
+const HUGE: f64 = 1e100;
 
 /// A sensor: `gain * level(t - delay) + bias + slope * t + walk(t) + noise`. Of a bit that is 1 above a threshold, the bias is minus the
 /// threshold.
@@ -67,16 +72,6 @@ pub struct LevelModel {
     pub sensors: Vec<SensorModel>,
 }
 
-/// A reading in the order of the times at which the level was as it says.
-#[derive(Debug, Clone, Copy)]
-struct Told {
-    /// Time of the level, and of the reading.
-    level: f64,
-    seconds: f64,
-    sensor: usize,
-    reading: Reading,
-}
-
 /// Numbers of the table that do not depend on the model.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scale {
@@ -114,7 +109,7 @@ impl LevelModel {
     }
 
     /// Mean and variance of the level at first.
-    fn first(&self, scale: &Scale) -> (f64, f64) {
+    pub(super) fn first(&self, scale: &Scale) -> (f64, f64) {
         match self.settled() {
             Some(variance) => (self.mean, variance),
             None => (scale.middle, (FIRST * scale.spread).powi(2)),
@@ -135,7 +130,8 @@ impl LevelModel {
         self.check()?;
         let scale = Scale::of(instants, self.sensors.len())?;
         let mut residuals = vec![Vec::new(); self.sensors.len()];
-        let total = self.run(instants, &scale, |sensor, score| residuals[sensor].push(score));
+        let readings = Readings::of(instants, self.sensors.len());
+        let total = self.run(&readings, &scale, |sensor, score| residuals[sensor].push(score));
         match total.filter(|total| total.is_finite()) {
             Some(total) => Ok((total, residuals)),
             None => Err(Error::NotANumber {
@@ -145,81 +141,78 @@ impl LevelModel {
     }
 
     /// The same without checks; `None` if numbers run out of range.
-    pub(super) fn run(&self, instants: &[Instant], scale: &Scale, mut each: impl FnMut(usize, f64)) -> Option<f64> {
-        let mut told: Vec<Told> = Vec::new();
-        for instant in instants {
-            for (sensor, reading) in &instant.values {
-                told.push(Told {
-                    level: instant.seconds - self.sensors[*sensor].delay,
-                    seconds: instant.seconds,
-                    sensor: *sensor,
-                    reading: *reading,
-                });
-            }
+    pub(super) fn run(&self, readings: &Readings, scale: &Scale, each: impl FnMut(usize, f64)) -> Option<f64> {
+        if self.sensors.iter().any(|sensor| sensor.walk > 0.0) {
+            self.through(readings, scale, Wandering::new(self, scale), each)
+        } else {
+            self.through(readings, scale, Steady::new(self, scale), each)
         }
-        if self.sensors.iter().any(|sensor| sensor.delay != 0.0) {
-            told.sort_by(|one, other| one.level.total_cmp(&other.level));
-        }
-        // Coordinate 0 is the level; then the walks.
-        let mut place = vec![None; self.sensors.len()];
-        let mut walks = Vec::new();
-        for (sensor, model) in self.sensors.iter().enumerate() {
-            if model.walk > 0.0 {
-                place[sensor] = Some(1 + walks.len());
-                walks.push(model.walk * model.walk);
-            }
-        }
-        let n = 1 + walks.len();
-        let (mut mean, mut covariance, mut cross) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; n]);
-        let rate = self.change * self.change;
-        let settled = self.settled();
-        (mean[0], covariance[0]) = self.first(scale);
-        let (mut total, mut now) = (0.0, told.first()?.level);
-        for one in &told {
-            let seconds = one.level - now;
+    }
+
+    fn through(
+        &self,
+        readings: &Readings,
+        scale: &Scale,
+        mut filter: impl Filter,
+        mut each: impl FnMut(usize, f64),
+    ) -> Option<f64> {
+        let mut now: Option<f64> = None;
+        // Most steps are as long as the one before.
+        let mut step = Step::new(self, 0.0);
+        // Logarithms are taken of products of many densities.
+        let (mut total, mut product) = (0.0, 1.0);
+        let mut take = |one: &Told, at: f64| {
+            let seconds = at - *now.get_or_insert(at);
             if seconds > 0.0 {
-                now = one.level;
-                match (self.time_constant, settled) {
-                    (Some(constant), Some(variance)) => {
-                        let kept = (-seconds / constant).exp();
-                        mean[0] = self.mean + kept * (mean[0] - self.mean);
-                        for j in 0..n {
-                            covariance[j] *= kept;
-                            covariance[j * n] *= kept;
-                        }
-                        covariance[0] -= variance * (-2.0 * seconds / constant).exp_m1();
-                    }
-                    _ => covariance[0] += rate * seconds,
+                now = Some(at);
+                if seconds != step.seconds {
+                    step = Step::new(self, seconds);
                 }
-                for (walk, variance) in walks.iter().enumerate() {
-                    covariance[(walk + 1) * n + walk + 1] += variance * seconds;
-                }
+                filter.predict(self.mean, &step);
             }
             let model = &self.sensors[one.sensor];
-            let own = place[one.sensor];
-            for (j, cross) in cross.iter_mut().enumerate() {
-                *cross = model.gain * covariance[j * n] + own.map_or(0.0, |own| covariance[j * n + own]);
-            }
-            let variance = model.gain * cross[0] + own.map_or(0.0, |own| cross[own]);
-            let offset = model.bias + model.slope * (one.seconds - scale.begin);
-            let expected = model.gain * mean[0] + own.map_or(0.0, |own| mean[own]) + offset;
+            let (expected, variance) = filter.expected(one.sensor, model);
+            let expected = expected + model.bias + model.slope * (one.seconds - scale.begin);
             let said = one.reading.said(expected, variance.max(0.0), model.noise, None)?;
-            let (right, wild) = ((1.0 - WILD) * said.log.exp(), one.reading.wild(WILD, scale.range));
-            total += (right + wild).ln();
-            let weight = right / (right + wild);
+            let (right, wild) = ((1.0 - WILD) * said.density, one.reading.wild(WILD, scale.range));
+            let both = right + wild;
+            product *= both;
+            let is_in_range = (TINY..HUGE).contains(&product);
+            if !is_in_range {
+                total += product.ln();
+                product = 1.0;
+            }
             if one.reading.value().is_some() {
                 each(one.sensor, said.score);
             }
-            let deviation = said.variance.sqrt();
+            let weight = right / both;
             let spread = weight * ((1.0 - said.left) - (1.0 - weight) * said.score * said.score);
-            for i in 0..n {
-                mean[i] += cross[i] / deviation * weight * said.score;
-                for j in 0..n {
-                    covariance[i * n + j] -= cross[i] * cross[j] / said.variance * spread;
+            filter.update(weight * said.score / said.variance.sqrt(), spread / said.variance);
+            Some(())
+        };
+        if self.sensors.iter().all(|sensor| sensor.delay == 0.0) {
+            for one in &readings.told {
+                take(one, one.seconds)?;
+            }
+        } else {
+            // The next reading of each sensor, by the time of the level that it is of.
+            let mut next = vec![0; self.sensors.len()];
+            for _ in 0..readings.told.len() {
+                let mut first: Option<(f64, usize, usize)> = None;
+                for (sensor, own) in readings.by_sensor.iter().enumerate() {
+                    let Some(place) = own.get(next[sensor]) else { continue };
+                    let at = readings.told[*place].seconds - self.sensors[sensor].delay;
+                    if first.is_none_or(|(time, before, _)| at < time || (at == time && *place < before)) {
+                        first = Some((at, *place, sensor));
+                    }
                 }
+                let (at, place, sensor) = first?;
+                next[sensor] += 1;
+                take(&readings.told[place], at)?;
             }
         }
-        (!total.is_nan()).then_some(total)
+        let total = total + product.ln();
+        (!total.is_nan() && !readings.told.is_empty()).then_some(total)
     }
 }
 
@@ -238,7 +231,7 @@ impl Scale {
                 if *sensor >= sensors {
                     return refuse("sensor", sensor, format!("below {sensors}"));
                 }
-                numbers.extend(reading.value());
+                numbers.extend(reading.middle());
             }
         }
         numbers.sort_by(f64::total_cmp);

@@ -1,5 +1,6 @@
 //! Parameters, and what is known of them.
 
+use super::model::LevelModel;
 use serde::{Deserialize, Serialize};
 
 /// A parameter. Sensors are given by index.
@@ -30,6 +31,37 @@ pub enum Quantity {
 impl Quantity {
     pub(super) fn is_positive(self) -> bool {
         matches!(self, Self::Change | Self::TimeConstant | Self::Noise(_) | Self::Walk(_))
+    }
+
+    /// Its value; `None` of the time constant of a level that wanders.
+    pub(super) fn of(self, model: &LevelModel) -> Option<f64> {
+        let own = |sensor: usize| &model.sensors[sensor];
+        Some(match self {
+            Self::Change => model.change,
+            Self::TimeConstant => return model.time_constant,
+            Self::Mean => model.mean,
+            Self::Noise(sensor) => own(sensor).noise,
+            Self::Bias(sensor) => own(sensor).bias,
+            Self::Gain(sensor) => own(sensor).gain,
+            Self::Slope(sensor) => own(sensor).slope,
+            Self::Walk(sensor) => own(sensor).walk,
+            Self::Delay(sensor) => own(sensor).delay,
+        })
+    }
+
+    /// Replaces it.
+    pub(super) fn set(self, model: &mut LevelModel, value: f64) {
+        match self {
+            Self::Change => model.change = value,
+            Self::TimeConstant => model.time_constant = Some(value),
+            Self::Mean => model.mean = value,
+            Self::Noise(sensor) => model.sensors[sensor].noise = value,
+            Self::Bias(sensor) => model.sensors[sensor].bias = value,
+            Self::Gain(sensor) => model.sensors[sensor].gain = value,
+            Self::Slope(sensor) => model.sensors[sensor].slope = value,
+            Self::Walk(sensor) => model.sensors[sensor].walk = value,
+            Self::Delay(sensor) => model.sensors[sensor].delay = value,
+        }
     }
 }
 

@@ -1,8 +1,9 @@
 //! The search for the parameters.
 
 use super::model::{LevelModel, Scale};
-use super::parameters::{Estimate, Quantity, Refusal};
-use super::search::{information, maximum};
+use super::parameters::{Quantity, Refusal};
+use super::readings::Readings;
+use super::search::{Maximum, maximum};
 use crate::calibration::{Instant, median};
 use nalgebra::{DMatrix, DVector};
 
@@ -10,25 +11,31 @@ use nalgebra::{DMatrix, DVector};
 /// A walk cannot be negative, so half of that is as much evidence.
 const WORTH: f64 = 2.0;
 const WORTH_OF_WALK: f64 = 1.35;
+/// The same of a drift beside a walk, or in place of one: a drift of several deviations of the noise that is there loses more than ten by being taken for
+/// a walk.
+const WORTH_BESIDE_WALK: f64 = 6.0;
 /// Deviation of the logarithm of a change or a noise about the first guess: nothing may be taken for zero only because the readings do not
 /// tell it from zero.
 const VAGUE: f64 = 2.0;
 /// Starts from which the search climbs.
 const CLIMBS: usize = 3;
-/// Standard errors above these say that a parameter is not determined: of logarithms, and in units of the search.
-const UNDETERMINED_LOG: f64 = 2.0;
-const UNDETERMINED: f64 = 30.0;
+/// A step that raises the likelihood by less ends a search: by a part, and where only the sizes of two maxima are compared.
+const LITTLE: f64 = 1e-6;
+const ENOUGH: f64 = 1e-2;
 /// Half of the delays that are tried, in half intervals between readings.
 const DELAYS: i32 = 12;
 
 /// The search, in units in which every parameter is about as uncertain.
 pub(super) struct Problem<'a> {
-    instants: &'a [Instant],
-    scale: Scale,
+    readings: Readings,
+    /// Stretches of a long table, by which the search begins, and whether it is about these now.
+    part: Option<Readings>,
+    is_rough: bool,
+    pub(super) scale: Scale,
     pub(super) model: LevelModel,
     /// The first guess.
     guess: LevelModel,
-    free: Vec<Quantity>,
+    pub(super) free: Vec<Quantity>,
     /// Seconds of all readings, and between two.
     length: f64,
     interval: f64,
@@ -43,9 +50,12 @@ impl<'a> Problem<'a> {
             .map(|pair| pair[1].seconds - pair[0].seconds)
             .filter(|gap| *gap > 0.0);
         let interval = median(gaps.collect());
+        let readings = Readings::of(instants, model.sensors.len());
         let length = instants.last().map_or(0.0, |last| last.seconds - scale.begin);
         Self {
-            instants,
+            part: readings.part(),
+            readings,
+            is_rough: false,
             scale,
             guess: model.clone(),
             model,
@@ -62,7 +72,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The unit of a parameter that may have either sign.
-    fn unit(&self, quantity: Quantity) -> f64 {
+    pub(super) fn unit(&self, quantity: Quantity) -> f64 {
         match quantity {
             Quantity::Bias(sensor) => self.model.sensors[sensor].noise,
             Quantity::Slope(sensor) => self.model.sensors[sensor].noise / self.length,
@@ -72,23 +82,12 @@ impl<'a> Problem<'a> {
         }
     }
 
-    fn value(&self, quantity: Quantity) -> f64 {
-        let of = |sensor: usize| &self.model.sensors[sensor];
-        match quantity {
-            Quantity::Change => self.model.change,
-            Quantity::TimeConstant => self.model.time_constant.unwrap_or(0.1 * self.length),
-            Quantity::Mean => self.model.mean,
-            Quantity::Noise(sensor) => of(sensor).noise,
-            Quantity::Bias(sensor) => of(sensor).bias,
-            Quantity::Gain(sensor) => of(sensor).gain,
-            Quantity::Slope(sensor) => of(sensor).slope,
-            Quantity::Walk(sensor) => of(sensor).walk,
-            Quantity::Delay(sensor) => of(sensor).delay,
-        }
+    pub(super) fn value(&self, quantity: Quantity) -> f64 {
+        quantity.of(&self.model).unwrap_or(0.1 * self.length)
     }
 
     /// The model at a point of the search, which is zero at the present one.
-    fn at(&self, point: &DVector<f64>) -> LevelModel {
+    pub(super) fn at(&self, point: &DVector<f64>) -> LevelModel {
         let mut model = self.model.clone();
         for (quantity, off) in self.free.iter().zip(point.iter()) {
             let before = self.value(*quantity);
@@ -97,14 +96,19 @@ impl<'a> Problem<'a> {
             } else {
                 before + off * self.unit(*quantity)
             };
-            set(&mut model, *quantity, value);
+            quantity.set(&mut model, value);
+            if let Quantity::Gain(sensor) = *quantity {
+                // The coordinate of the offset is what the sensor reads at the middle of all values: a gain alone turns about that.
+                model.sensors[sensor].bias -= (value - before) * self.scale.middle;
+            }
         }
         model
     }
 
-    fn log_likelihood(&self, model: &LevelModel) -> f64 {
+    pub(super) fn log_likelihood(&self, model: &LevelModel) -> f64 {
         let found = if (self.goes_on)() && model.check().is_ok() {
-            model.run(self.instants, &self.scale, |_, _| {})
+            let part = self.part.as_ref().filter(|_| self.is_rough);
+            model.run(part.unwrap_or(&self.readings), &self.scale, |_, _| {})
         } else {
             None
         };
@@ -124,8 +128,9 @@ impl<'a> Problem<'a> {
         self.log_likelihood(model) - self.free.iter().map(far).sum::<f64>()
     }
 
-    /// Climbs from several changes, each with the delays that fit best.
+    /// Climbs from several changes, each with the delays that fit best. Of a long table all but the last climb is about a part.
     pub(super) fn solve(&mut self) {
+        self.is_rough = self.part.is_some();
         let change = self.model.change;
         let mut starts: Vec<(f64, LevelModel)> = [1e-2, 0.1, 1.0, 3.0, 10.0]
             .map(|factor| {
@@ -143,14 +148,14 @@ impl<'a> Problem<'a> {
         for (_, start) in starts {
             self.model = start;
             // Units follow the noises, so the second climb begins in better ones.
-            self.climb();
-            let mut found = self.climb();
+            self.step_up(None, LITTLE);
+            let mut found = self.step_up(None, LITTLE).value;
             if self.free.iter().any(|one| matches!(one, Quantity::Delay(_))) {
                 // The likelihood has kinks in a delay, at which a climb may end.
                 let (finer, model) = self.with_best_delays(self.model.clone(), -DELAYS..=DELAYS, 0.125);
                 if finer > found {
                     self.model = model;
-                    found = self.climb();
+                    found = self.step_up(None, LITTLE).value;
                 }
             }
             if best.as_ref().is_none_or(|(most, _)| found > *most) {
@@ -159,6 +164,10 @@ impl<'a> Problem<'a> {
         }
         if let Some((_, model)) = best {
             self.model = model;
+        }
+        if self.is_rough {
+            self.is_rough = false;
+            self.climb();
         }
     }
 
@@ -194,10 +203,32 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// Climbs, of a long table first by its part; the value at the maximum.
     fn climb(&mut self) -> f64 {
-        let (point, best) = maximum(|point| self.worth(&self.at(point)), DVector::zeros(self.free.len()));
-        self.model = self.at(&point);
-        best
+        let known = self.climb_by_part();
+        self.step_up(known, LITTLE).value
+    }
+
+    /// The same up to what a comparison needs. Of a long table the end of the climb is left out.
+    fn climb_nearly(&mut self) -> f64 {
+        let known = self.climb_by_part();
+        let little = if self.part.is_some() { ENOUGH } else { LITTLE };
+        self.step_up(known, little).value
+    }
+
+    /// What the climb to the maximum of the part of a long table finds out of its shape.
+    fn climb_by_part(&mut self) -> Option<DMatrix<f64>> {
+        let share = self.part.as_ref()?.told.len() as f64 / self.readings.told.len() as f64;
+        self.is_rough = true;
+        let found = self.step_up(None, LITTLE);
+        self.is_rough = false;
+        found.inverse.map(|inverse| inverse * share)
+    }
+
+    fn step_up(&mut self, known: Option<DMatrix<f64>>, little: f64) -> Maximum {
+        let found = maximum(|point| self.worth(&self.at(point)), self.free.len(), known, little);
+        self.model = self.at(&found.point);
+        found
     }
 
     /// Whether the level returns to its mean.
@@ -210,7 +241,7 @@ impl<'a> Problem<'a> {
             ..before.clone()
         });
         self.take_best(returning.into_iter());
-        let found = self.climb();
+        let found = self.climb_nearly();
         let is_short = self.model.time_constant.is_some_and(|seconds| seconds < self.length);
         if !is_short || found < wandering + WORTH {
             (self.model, self.free) = (before, free);
@@ -218,6 +249,8 @@ impl<'a> Problem<'a> {
                 quantity: Quantity::TimeConstant,
                 reason: "a level that only wanders explains the readings as well".to_owned(),
             });
+        } else if self.part.is_some() {
+            self.climb();
         }
     }
 
@@ -229,26 +262,34 @@ impl<'a> Problem<'a> {
             }
             let (before, free) = (self.model.clone(), self.free.clone());
             let steady = self.worth(&before);
-            let whole = before.sensors[sensor].noise / self.length.sqrt();
-            self.free.push(Quantity::Walk(sensor));
-            let wandering = [0.5, 2.0, 8.0].map(|factor| {
-                let mut model = before.clone();
-                model.sensors[sensor].walk = factor * whole;
-                model
-            });
-            self.take_best(wandering.into_iter());
-            if self.climb() < steady + WORTH_OF_WALK {
+            self.let_wander(sensor);
+            if self.climb_nearly() < steady + WORTH_OF_WALK {
                 (self.model, self.free) = (before, free);
                 refused.push(Refusal {
                     quantity: Quantity::Walk(sensor),
                     reason: "an offset that does not wander explains the readings as well".to_owned(),
                 });
+            } else if self.part.is_some() {
+                self.climb();
             }
         }
     }
 
-    /// Leaves out the drifts without which the readings are explained as well.
-    pub(super) fn try_without_slopes(&mut self, refused: &mut Vec<Refusal>) {
+    /// Gives the offset of a sensor a walk to begin with.
+    fn let_wander(&mut self, sensor: usize) {
+        let whole = self.model.sensors[sensor].noise / self.length.sqrt();
+        self.free.push(Quantity::Walk(sensor));
+        let wandering = [0.5, 2.0, 8.0].map(|factor| {
+            let mut model = self.model.clone();
+            model.sensors[sensor].walk = factor * whole;
+            model
+        });
+        self.take_best(wandering.into_iter());
+    }
+
+    /// Leaves out the drifts without which the readings are explained as well, and, if `may_wander`, nearly as well by an offset that wanders: a walk
+    /// looks like a drift, and a drift is extended beyond the readings.
+    pub(super) fn try_without_slopes(&mut self, may_wander: bool, refused: &mut Vec<Refusal>) {
         for sensor in 0..self.model.sensors.len() {
             let slope = Quantity::Slope(sensor);
             if !self.free.contains(&slope) {
@@ -261,96 +302,27 @@ impl<'a> Problem<'a> {
             let model = &mut self.model.sensors[sensor];
             model.bias += 0.5 * model.slope * self.length;
             model.slope = 0.0;
-            if self.climb() + WORTH < drifting {
+            let is_wandering = self.free.contains(&Quantity::Walk(sensor));
+            let most = if is_wandering { WORTH_BESIDE_WALK } else { WORTH };
+            let mut is_left = self.climb_nearly() + most >= drifting;
+            if !is_left && may_wander && !is_wandering {
+                self.let_wander(sensor);
+                is_left = self.climb_nearly() + WORTH_BESIDE_WALK >= drifting;
+                if is_left {
+                    refused.retain(|one| one.quantity != Quantity::Walk(sensor));
+                }
+            }
+            if !is_left {
                 (self.model, self.free) = (before, free);
             } else {
+                if self.part.is_some() {
+                    self.climb();
+                }
                 refused.push(Refusal {
                     quantity: slope,
                     reason: "an offset that does not drift explains the readings as well".to_owned(),
                 });
             }
         }
-    }
-
-    /// Standard errors. Parameters that the readings do not determine are refused, one after the other: the others' errors are those with it
-    /// held where it is.
-    pub(super) fn errors(&self, refused: &mut Vec<Refusal>) -> Vec<Estimate> {
-        // The likelihood has a kink in a delay wherever two readings change places.
-        let step = |quantity: &Quantity| {
-            if matches!(quantity, Quantity::Delay(_)) {
-                0.25
-            } else {
-                1e-2
-            }
-        };
-        let steps: Vec<f64> = self.free.iter().map(step).collect();
-        let origin = DVector::zeros(self.free.len());
-        let found = information(|point| self.log_likelihood(&self.at(point)), &origin, &steps);
-        let is_number = |i: &usize| found.row(*i).iter().all(|one| one.is_finite());
-        let mut left: Vec<usize> = (0..self.free.len()).filter(is_number).collect();
-        let mut deviations = vec![f64::INFINITY; self.free.len()];
-        while !left.is_empty() {
-            let part = DMatrix::from_fn(left.len(), left.len(), |i, j| found[(left[i], left[j])]);
-            let eigen = part.symmetric_eigen();
-            let most = |i: usize| {
-                let quantity = self.free[left[i]];
-                if quantity.is_positive() {
-                    UNDETERMINED_LOG
-                } else {
-                    UNDETERMINED
-                }
-            };
-            let errors: Vec<f64> = (0..left.len())
-                .map(|i| {
-                    let one = |k: usize| eigen.eigenvectors[(i, k)].powi(2) / eigen.eigenvalues[k].max(1e-6);
-                    (0..left.len()).map(one).sum::<f64>().sqrt()
-                })
-                .collect();
-            // The one that exceeds its limit by most.
-            let excess = |i: &usize| errors[*i] / most(*i);
-            let worst = (0..left.len()).max_by(|one, other| excess(one).total_cmp(&excess(other)));
-            let Some(worst) = worst.filter(|worst| excess(worst) > 1.0) else {
-                left.iter().zip(&errors).for_each(|(i, error)| deviations[*i] = *error);
-                break;
-            };
-            deviations[left[worst]] = f64::INFINITY;
-            left.remove(worst);
-        }
-        let mut estimates = Vec::new();
-        for (quantity, deviation) in self.free.iter().zip(deviations) {
-            let value = self.value(*quantity);
-            let unit = if quantity.is_positive() {
-                value
-            } else {
-                self.unit(*quantity)
-            };
-            if deviation.is_finite() {
-                estimates.push(Estimate {
-                    quantity: *quantity,
-                    value,
-                    standard_error: deviation * unit,
-                });
-            } else {
-                refused.push(Refusal {
-                    quantity: *quantity,
-                    reason: format!("the readings do not determine it; taken as {value:.4e}"),
-                });
-            }
-        }
-        estimates
-    }
-}
-
-fn set(model: &mut LevelModel, quantity: Quantity, value: f64) {
-    match quantity {
-        Quantity::Change => model.change = value,
-        Quantity::TimeConstant => model.time_constant = Some(value),
-        Quantity::Mean => model.mean = value,
-        Quantity::Noise(sensor) => model.sensors[sensor].noise = value,
-        Quantity::Bias(sensor) => model.sensors[sensor].bias = value,
-        Quantity::Gain(sensor) => model.sensors[sensor].gain = value,
-        Quantity::Slope(sensor) => model.sensors[sensor].slope = value,
-        Quantity::Walk(sensor) => model.sensors[sensor].walk = value,
-        Quantity::Delay(sensor) => model.sensors[sensor].delay = value,
     }
 }

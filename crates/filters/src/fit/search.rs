@@ -6,8 +6,6 @@ use nalgebra::{DMatrix, DVector};
 const STEPS: usize = 80;
 const HALVINGS: usize = 14;
 const DIFFERENCE: f64 = 1e-4;
-/// A step that raises the function by less ends the search.
-const LITTLE: f64 = 1e-6;
 /// Longest step in a coordinate.
 const LONGEST: f64 = 1.5;
 
@@ -23,16 +21,37 @@ fn gradient(of: &impl Fn(&DVector<f64>) -> f64, at: &DVector<f64>) -> DVector<f6
     })
 }
 
-/// A local maximum near a start (Broyden, Fletcher, Goldfarb and Shanno's steps, backtracking).
-pub(super) fn maximum(of: impl Fn(&DVector<f64>) -> f64, start: DVector<f64>) -> (DVector<f64>, f64) {
-    let count = start.len();
+/// Where a search ended.
+pub(super) struct Maximum {
+    pub(super) point: DVector<f64>,
+    pub(super) value: f64,
+    /// The inverse of minus the second derivatives, as far as the steps found it out.
+    pub(super) inverse: Option<DMatrix<f64>>,
+}
+
+/// A local maximum near zero (Broyden, Fletcher, Goldfarb and Shanno's steps, backtracking). `known`: an inverse of minus the second derivatives
+/// to begin with. `little`: a step that raises the function by less ends the search.
+pub(super) fn maximum(
+    of: impl Fn(&DVector<f64>) -> f64,
+    count: usize,
+    known: Option<DMatrix<f64>>,
+    little: f64,
+) -> Maximum {
+    let start = DVector::zeros(count);
     let (mut x, mut best) = (start.clone(), of(&start));
-    if count == 0 {
-        return (x, best);
-    }
     let mut inverse = DMatrix::<f64>::identity(count, count);
-    let mut slope = gradient(&of, &x);
     let mut is_fresh = true;
+    if let Some(known) = known.filter(|known| known.shape() == (count, count)) {
+        (inverse, is_fresh) = (known, false);
+    }
+    if count == 0 {
+        return Maximum {
+            point: x,
+            value: best,
+            inverse: None,
+        };
+    }
+    let mut slope = gradient(&of, &x);
     for _ in 0..STEPS {
         let mut step = &inverse * &slope;
         if step.dot(&slope) <= 0.0 {
@@ -77,11 +96,15 @@ pub(super) fn maximum(of: impl Fn(&DVector<f64>) -> f64, start: DVector<f64>) ->
             is_fresh = false;
         }
         (x, best, slope) = (other, found, other_slope);
-        if rise < LITTLE {
+        if rise < little {
             break;
         }
     }
-    (x, best)
+    Maximum {
+        point: x,
+        value: best,
+        inverse: (!is_fresh).then_some(inverse),
+    }
 }
 
 /// The observed information: minus the second derivatives, by differences of these steps.
@@ -93,16 +116,15 @@ pub(super) fn information(of: impl Fn(&DVector<f64>) -> f64, at: &DVector<f64>, 
         of(&other)
     };
     let middle = of(at);
+    let single: Vec<f64> = (0..count)
+        .map(|i| value(&[(i, steps[i])]) + value(&[(i, -steps[i])]) - 2.0 * middle)
+        .collect();
     let mut found = DMatrix::zeros(count, count);
     for i in 0..count {
-        let own = steps[i];
-        found[(i, i)] = (2.0 * middle - value(&[(i, own)]) - value(&[(i, -own)])) / (own * own);
+        found[(i, i)] = -single[i] / (steps[i] * steps[i]);
         for j in 0..i {
-            let other = steps[j];
-            let mixed =
-                value(&[(i, own), (j, other)]) - value(&[(i, own), (j, -other)]) - value(&[(i, -own), (j, other)])
-                    + value(&[(i, -own), (j, -other)]);
-            found[(i, j)] = -mixed / (4.0 * own * other);
+            let both = value(&[(i, steps[i]), (j, steps[j])]) + value(&[(i, -steps[i]), (j, -steps[j])]) - 2.0 * middle;
+            found[(i, j)] = -0.5 * (both - single[i] - single[j]) / (steps[i] * steps[j]);
             found[(j, i)] = found[(i, j)];
         }
     }

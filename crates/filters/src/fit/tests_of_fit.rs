@@ -62,7 +62,38 @@ pub(super) fn of(residuals: &[Vec<f64>]) -> Vec<SensorTest> {
     residuals.iter().enumerate().filter_map(one).collect()
 }
 
-/// Correlations of what the sensors' values are off from a reference.
+/// What a sensor is off from the level that the reference reads about the time that it is late: from the line between two of its values.
+#[derive(Debug, Clone, Copy)]
+struct Off {
+    value: f64,
+    /// The first of the two values, the share of the way to the second, and the seconds between them.
+    place: usize,
+    share: f64,
+    seconds: f64,
+}
+
+impl Off {
+    /// Share of the reference's variance that two have in common, and variance of the level's way from the line per squared change.
+    fn common(&self, other: &Self) -> (f64, f64) {
+        let weights = |off: &Self| [(off.place, 1.0 - off.share), (off.place + 1, off.share)];
+        let mut noise = 0.0;
+        for (place, weight) in weights(self) {
+            for (same, further) in weights(other) {
+                noise += if place == same { weight * further } else { 0.0 };
+            }
+        }
+        let (one, two) = (self.share.min(other.share), self.share.max(other.share));
+        let way = if self.place == other.place {
+            self.seconds * one * (1.0 - two)
+        } else {
+            0.0
+        };
+        (noise, way)
+    }
+}
+
+/// Correlations of the noises of two sensors beside a reference: of what both are off from its values, less what its own noise, and the level
+/// between its values, bring into both.
 pub(super) fn correlations(instants: &[Instant], model: &LevelModel, reference: usize) -> Vec<Correlation> {
     let begin = instants.first().map_or(0.0, |instant| instant.seconds);
     let level: Vec<(f64, f64)> = instants
@@ -72,44 +103,60 @@ pub(super) fn correlations(instants: &[Instant], model: &LevelModel, reference: 
         .filter_map(|(seconds, (_, reading))| Some((seconds, reading.value()?)))
         .collect();
     let at = |seconds: f64| {
-        let next = level.partition_point(|one| one.0 < seconds);
-        let after = level.get(next)?;
-        let before = level.get(next.checked_sub(1).unwrap_or(next))?;
-        let share = if after.0 > before.0 {
-            (seconds - before.0) / (after.0 - before.0)
-        } else {
-            0.0
+        let next = level.partition_point(|one| one.0 <= seconds);
+        let place = next.checked_sub(1)?;
+        let before = level[place];
+        let Some(after) = level.get(next) else {
+            return (before.0 == seconds).then_some((before.1, place, 0.0, 0.0));
         };
-        (seconds >= before.0).then_some(before.1 + share * (after.1 - before.1))
+        let share = (seconds - before.0) / (after.0 - before.0);
+        Some((before.1 + share * (after.1 - before.1), place, share, after.0 - before.0))
     };
     let count = model.sensors.len();
-    let off = |instant: &Instant| -> Vec<Option<f64>> {
+    let own_variance = model.sensors[reference].noise.powi(2);
+    let rate = model.change * model.change;
+    let off = |instant: &Instant| -> Vec<Option<Off>> {
         let mut found = vec![None; count];
-        for (sensor, reading) in &instant.values {
+        for (sensor, reading) in instant.values.iter().filter(|(sensor, _)| *sensor != reference) {
             let own = &model.sensors[*sensor];
-            if let (Some(value), Some(level)) = (reading.value(), at(instant.seconds - own.delay)) {
-                let expected = own.gain * level + own.bias + own.slope * (instant.seconds - begin);
-                let score = (value - expected) / own.noise;
-                found[*sensor] = (own.walk == 0.0 && score.abs() <= 5.0).then_some(score);
-            }
+            let about = reading.value().zip(at(instant.seconds - own.delay));
+            let Some((value, (level, place, share, seconds))) = about.filter(|_| own.walk == 0.0) else {
+                continue;
+            };
+            let off = Off {
+                value: value - own.gain * level - own.bias - own.slope * (instant.seconds - begin),
+                place,
+                share,
+                seconds,
+            };
+            let (noise, way) = off.common(&off);
+            let variance = own.noise.powi(2) + own.gain.powi(2) * (noise * own_variance + way * rate);
+            found[*sensor] = (off.value.powi(2) <= 25.0 * variance).then_some(off);
         }
         found
     };
-    let rows: Vec<Vec<Option<f64>>> = instants.iter().map(off).collect();
+    let rows: Vec<Vec<Option<Off>>> = instants.iter().map(off).collect();
     let mut found = Vec::new();
     for one in (0..count).filter(|one| *one != reference) {
         for other in (one + 1..count).filter(|other| *other != reference) {
-            let pairs: Vec<(f64, f64)> = rows.iter().filter_map(|row| Some((row[one]?, row[other]?))).collect();
-            if pairs.len() < FEWEST {
+            let (first, second) = (&model.sensors[one], &model.sensors[other]);
+            let product = |row: &Vec<Option<Off>>| {
+                let (own, its) = (row[one]?, row[other]?);
+                let (noise, way) = own.common(&its);
+                let shared = first.gain * second.gain * (noise * own_variance + way * rate);
+                Some((own.value * its.value - shared) / (first.noise * second.noise))
+            };
+            let products: Vec<f64> = rows.iter().filter_map(product).collect();
+            if products.len() < FEWEST {
                 continue;
             }
-            let sum = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>();
-            let value =
-                sum(&|pair| pair.0 * pair.1) / (sum(&|pair| pair.0 * pair.0) * sum(&|pair| pair.1 * pair.1)).sqrt();
+            let number = products.len() as f64;
+            let value = products.iter().sum::<f64>() / number;
+            let squares = products.iter().map(|one| (one - value) * (one - value)).sum::<f64>();
             found.push(Correlation {
                 sensors: (one, other),
                 value,
-                standard_error: (1.0 - value * value) / (pairs.len() as f64).sqrt(),
+                standard_error: squares.sqrt() / number,
             });
         }
     }

@@ -1,7 +1,7 @@
 //! Noise, change and offsets found from recorded values, against the numbers that made them.
 
 use fewbits_core::Gaussian;
-use fewbits_filters::calibration::{Calibration, Instant, Level, Number, Reading, median, offsets};
+use fewbits_filters::calibration::{Calibration, Instant, Level, Number, Reading, median, offsets, shift_deviation};
 use fewbits_models::ContinuousLinear;
 use fewbits_monte_carlo::Stream;
 use rand::{Rng, RngExt};
@@ -229,4 +229,30 @@ fn a_noise_that_may_as_well_be_larger_is_not_left_at_the_least() {
     let least = 1e-5;
     let calibration = found(&instants, &[Number::Unknown { guess: least, least }]);
     assert!(calibration.noises[0] > 1e-3, "{calibration:?}");
+}
+
+/// What the offsets' errors shift the level is as large as it is found to be, over many tables.
+#[test]
+fn the_shift_by_offsets_is_as_large_as_said() {
+    for noises in [&[0.5, 1.0][..], &[0.3, 1.0, 0.5, 2.0], &[0.2, 1.0, 1.0, 1.0, 1.0]] {
+        let weights: Vec<f64> = noises.iter().map(|noise| 1.0 / (noise * noise)).collect();
+        let sum: f64 = weights.iter().sum();
+        let (mut squares, mut said, tables) = (0.0, 0.0, 200);
+        for seed in 0..tables {
+            let instants = recorded(1000 + seed, 0.05, noises, &[], 200);
+            let found = offsets(&instants, noises.len(), None);
+            let shift = found
+                .iter()
+                .zip(&weights)
+                .map(|(one, weight)| one * weight)
+                .sum::<f64>()
+                / sum;
+            squares += shift * shift;
+            said += shift_deviation(&instants, &weights, None).powi(2);
+        }
+        // The errors vary by a twentieth with so many tables; a jackknife of medians is good to a fifth or so.
+        let ratio = (said / squares).sqrt();
+        assert!((0.75..1.5).contains(&ratio), "{noises:?}: {ratio}");
+    }
+    assert_eq!(shift_deviation(&recorded(1, 0.1, &[0.5], &[], 100), &[1.0], None), 0.0);
 }

@@ -1,7 +1,7 @@
 //! Calibration against the parameters that made the readings.
 
 use fewbits_filters::calibration::{Instant, Reading};
-use fewbits_filters::fit::{Fit, LevelModel, Quantity, Request, SensorModel, fit};
+use fewbits_filters::fit::{Fit, LevelModel, Quantity, Request, SensorModel, fit, fit_watched};
 use fewbits_monte_carlo::Stream;
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -185,6 +185,9 @@ fn measure(name: &str, truth: &LevelModel, bits: &[usize], request: &Request, wo
             model.log_likelihood(&record).unwrap().0 - model.log_likelihood(&record[..ROWS]).unwrap().0
         };
         let (own, best) = (held_out(&found.model), held_out(truth));
+        if best - own > 50.0 {
+            println!("  {seed}: {:.1} nats, {:?}, refused {:?}", best - own, found.model, found.refused);
+        }
         worst = worst.max(best - own);
         poor += u64::from(best - own > 0.01 * best.abs());
         for estimate in &found.estimates {
@@ -362,6 +365,107 @@ fn shared_noise_is_seen_beside_a_reference() {
     .unwrap();
     let one = found.correlations[0];
     assert!((one.value - 0.5).abs() < 4.0 * one.standard_error, "{one:?}");
+}
+
+/// Defect: what a reference's own noise brings into both sensors was taken for a correlation of theirs, 0.44 here for 0.
+#[test]
+fn the_noise_of_a_reference_is_no_correlation_of_others() {
+    let delayed = SensorModel {
+        delay: 1.5,
+        gain: 1.4,
+        ..exact(0.2)
+    };
+    for last in [exact(0.2), delayed] {
+        let truth = walk(0.3, vec![exact(0.4), exact(0.5), last]);
+        let request = Request {
+            reference: Some(0),
+            gain: true,
+            delay: true,
+            ..Request::default()
+        };
+        let found = fit(&record(4, &truth, &[], 800), 3, &request).unwrap();
+        let one = found.correlations[0];
+        assert!(one.value.abs() < 4.0 * one.standard_error && one.standard_error < 0.15, "{one:?}");
+    }
+}
+
+/// Defects: a gain turned the readings about zero, so that the search for one about a level of a million ended at 1; a sensor that stands still, or
+/// has few readings, held the level where it was first guessed to be.
+#[test]
+fn a_gain_far_from_zero_and_sensors_that_say_nothing() {
+    let far = SensorModel {
+        gain: 1.1,
+        bias: 500.0,
+        ..exact(0.4)
+    };
+    let truth = LevelModel {
+        mean: 1e6,
+        ..walk(0.3, vec![exact(0.3), far])
+    };
+    let request = Request {
+        reference: Some(0),
+        gain: true,
+        ..Request::default()
+    };
+    let plain = record(6, &truth, &[], ROWS);
+    let found = fit(&plain, 2, &request).unwrap();
+    for one in &found.estimates {
+        let off = (one.value - true_value(&truth, one.quantity)) / one.standard_error;
+        assert!(off.abs() < 4.0, "{one:?}");
+    }
+    let mut more = plain.clone();
+    for (row, instant) in more.iter_mut().enumerate() {
+        instant.values.push((2, Reading::from(7.0)));
+        if row < 5 {
+            instant.values.push((3, Reading::from(row as f64)));
+        }
+    }
+    let other = fit(&more, 4, &request).unwrap();
+    assert_eq!((other.log_likelihood, &other.estimates), (found.log_likelihood, &found.estimates));
+    assert_eq!(other.refused.len(), 2);
+    // Nothing varies.
+    let still: Vec<Instant> = (0..50)
+        .map(|row| Instant {
+            seconds: f64::from(row),
+            values: vec![(0, Reading::from(5.0))],
+        })
+        .collect();
+    let error = fit(&still, 1, &Request::default()).unwrap_err().to_string();
+    assert!(error.contains("that vary"), "{error}");
+}
+
+/// A long table is searched by stretches of it first: what is found is as likely as what a search of all readings finds, and within its errors.
+#[test]
+fn a_long_table_is_fitted_as_well_as_a_short_one() {
+    let drifting = SensorModel {
+        slope: 2e-4,
+        ..exact(0.5)
+    };
+    let late = SensorModel {
+        delay: 1.5,
+        gain: 0.9,
+        ..exact(0.6)
+    };
+    let truth = walk(0.3, vec![exact(0.4), drifting, late]);
+    let request = Request {
+        reference: Some(0),
+        slope: true,
+        gain: true,
+        delay: true,
+        ..Request::default()
+    };
+    let rows = record(8, &truth, &[], 5000);
+    let calls = std::cell::Cell::new(0);
+    let found = fit_watched(&rows, 3, &request, &|| {
+        calls.set(calls.get() + 1);
+        std::ops::ControlFlow::Continue(())
+    });
+    let found = found.unwrap().unwrap();
+    assert!(found.log_likelihood > truth.log_likelihood(&rows).unwrap().0 - 0.5, "{found:?}");
+    for one in &found.estimates {
+        let off = (one.value - true_value(&truth, one.quantity)) / one.standard_error;
+        assert!(off.abs() < 4.0, "{one:?}");
+    }
 }
 
 #[test]

@@ -12,6 +12,7 @@ mod fit;
 mod hooks;
 mod imm;
 mod lattice;
+mod moving_grid;
 mod own_law;
 mod particle;
 mod rao_blackwell;

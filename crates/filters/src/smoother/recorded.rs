@@ -1,17 +1,8 @@
-//! Smoothing of recorded estimates: each belief is improved by what was observed after it (Rauch, Tung and Striebel).
-//!
-//! Only the filtered beliefs and the dynamics are needed, so it works behind every filter with Gaussian beliefs, whatever was observed: values,
-//! bits, cells, silence. With linear dynamics and values it is exact.
-//!
-//! ```text
-//! P+ = F P F' + Q,  C = P F' P+^-1
-//! mean = mean + C (next mean - f(mean)),  P = (I - C F) P (I - C F)' + C (next P + Q) C'
-//! ```
+//! A whole recording of filtered beliefs, smoothed at once or with a lag.
 
-use fewbits_core::{Error, Evolution, Gaussian};
+use super::smooth_along;
+use fewbits_core::{Error, Evolution, Gaussian, ScaledNoise};
 use fewbits_numerics::error::refuse;
-use fewbits_numerics::linalg::solve_semidefinite;
-use nalgebra::SMatrix;
 
 /// A filtered belief.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,7 +68,9 @@ fn back<const D: usize>(
         next = if after.is_new {
             one.belief
         } else {
-            step(world, one, after, &next)?
+            let dynamics = world.over(after.seconds - one.seconds)?;
+            let dynamics = ScaledNoise::new(&*dynamics, after.noise_scale);
+            smooth_along(&dynamics, &one.belief, &next)?
         };
         found.push(next);
     }
@@ -86,38 +79,12 @@ fn back<const D: usize>(
     Ok(found)
 }
 
-fn step<const D: usize>(
-    world: &impl Evolution<D>,
-    one: &Filtered<D>,
-    after: &Filtered<D>,
-    smoothed: &Gaussian<D>,
-) -> Result<Gaussian<D>, Error> {
-    let dynamics = world.over(after.seconds - one.seconds)?;
-    let (mean, covariance) = (one.belief.mean(), one.belief.covariance());
-    let transition: SMatrix<f64, D, D> = dynamics.jacobian(mean);
-    let noise = dynamics.noise_covariance_at(mean) * after.noise_scale;
-    let predicted = transition * covariance * transition.transpose() + noise;
-    let predicted = (predicted + predicted.transpose()) * 0.5;
-    let gain = solve_semidefinite(&predicted, &(transition * covariance))?.transpose();
-    // A sum of positive semidefinite terms, in which nothing cancels.
-    let keep = SMatrix::<f64, D, D>::identity() - gain * transition;
-    let future = smoothed.covariance() + noise;
-    let found = keep * covariance * keep.transpose() + gain * future * gain.transpose();
-    let next = mean + gain * (smoothed.mean() - dynamics.mean(mean));
-    if !next.iter().chain(found.iter()).all(|number| number.is_finite()) {
-        return Err(Error::NotANumber {
-            what: "a smoothed moment",
-        });
-    }
-    Ok(Gaussian::from_trusted_parts(next, (found + found.transpose()) * 0.5))
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use fewbits_core::{ArgumentError, Dynamics, GaussianDynamics};
-    use nalgebra::{DMatrix, DVector, Matrix1, SVector, Vector1};
+    use nalgebra::{DMatrix, DVector, Matrix1, SMatrix, SVector, Vector1};
     use rand::Rng;
 
     /// A random walk whose variance grows by .5 a second.

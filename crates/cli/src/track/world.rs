@@ -1,0 +1,104 @@
+//! The model of the level.
+
+use crate::arguments::Model;
+use fewbits_core::Gaussian;
+use fewbits_filters::Error as FilterError;
+use fewbits_filters::calibration::{self, Calibration, Level, Number};
+use fewbits_models::ContinuousLinear;
+use nalgebra::{SMatrix, SVector};
+
+/// Standard deviation of an unknown slope, in multiples of the change per time.
+const STEEPEST: f64 = 10.0;
+
+/// Model of the level.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct World {
+    pub(super) model: Model,
+    /// Standard deviation of the level from its forecast, and after how many seconds.
+    pub(super) change: f64,
+    pub(super) within: f64,
+    /// Mean and standard deviation of the level before the first row.
+    pub(super) prior: (f64, f64),
+    /// The same of the slope per second, if it is stated.
+    pub(super) slope: Option<(f64, f64)>,
+    /// Standard deviation of the slope per second that the first rows suggest; 0 if they are not known.
+    pub(super) steepest: f64,
+    /// Period of the level, if it is an angle.
+    pub(super) period: Option<f64>,
+    /// Whether the change is adapted during the run.
+    pub(super) is_learning: bool,
+    /// Number of sensors of the first rows.
+    pub(super) sensors: usize,
+    /// Whether all beliefs are kept, to be smoothed.
+    pub(super) is_smoothed: bool,
+    /// Standard deviation of what the offsets that were found shift all values.
+    pub(super) zero: f64,
+    /// Whether silence cuts the belief again and again, so that it is no Gaussian.
+    pub(super) is_cut: bool,
+    /// Seconds between rows.
+    pub(super) interval: f64,
+}
+
+impl World {
+    /// Mean and covariance of the state before the first row.
+    pub(super) fn start<const D: usize>(&self, change: f64) -> Result<Gaussian<D>, FilterError> {
+        let per_time = STEEPEST * change;
+        let of = |i: usize| match (i, self.slope) {
+            (0, _) => self.prior,
+            (1, Some(slope)) => slope,
+            (1, None) => (0.0, (per_time / self.within).max(self.steepest)),
+            _ => (0.0, per_time / self.within.powi(i as i32)),
+        };
+        let mean = SVector::<f64, D>::from_fn(|i, _| of(i).0);
+        let deviations = SVector::<f64, D>::from_fn(|i, _| of(i).1);
+        Ok(Gaussian::new(mean, SMatrix::from_diagonal(&deviations.component_mul(&deviations)))?)
+    }
+
+    /// From known values at time 0, the level after `t` has the variance `q t`, `q t^3 / 3` or `q t^5 / 20` if the level, the slope or the
+    /// curvature is a random walk of density `q`. Here it is `change^2`.
+    pub(super) fn walk(&self, change: f64) -> Result<ContinuousLinear<1>, FilterError> {
+        let (c, t) = (change * change, self.within);
+        match self.model {
+            Model::Returning => {
+                let variance = self.prior.1 * self.prior.1;
+                // The deviation after `within` seconds, `v (1 - exp(-2 t / tau))`, solved for `tau`.
+                let rate = -0.5 * (-c / variance).ln_1p() / t;
+                ContinuousLinear::ornstein_uhlenbeck(self.prior.0, 1.0 / rate, variance)
+            }
+            _ => ContinuousLinear::random_walk(c / t),
+        }
+    }
+
+    pub(super) fn velocity(&self, change: f64) -> Result<ContinuousLinear<2>, FilterError> {
+        ContinuousLinear::nearly_constant_velocity(3.0 * change * change / self.within.powi(3))
+    }
+
+    pub(super) fn acceleration(&self, change: f64) -> Result<ContinuousLinear<3>, FilterError> {
+        ContinuousLinear::nearly_constant_acceleration(20.0 * change * change / self.within.powi(5))
+    }
+
+    /// Change and noise of each sensor, found together from the first values.
+    pub(super) fn calibrate(
+        &self,
+        instants: &[calibration::Instant],
+        change: Number,
+        guess: f64,
+        noises: &[Number],
+    ) -> Result<Calibration, FilterError> {
+        let period = self.period;
+        match self.model {
+            Model::Velocity => {
+                let (world, prior) = (|change| self.velocity(change), &self.start(guess)?);
+                Level { world, prior, period }.calibrate(instants, change, noises)
+            }
+            Model::Acceleration => {
+                let (world, prior) = (|change| self.acceleration(change), &self.start(guess)?);
+                Level { world, prior, period }.calibrate(instants, change, noises)
+            }
+            _ => {
+                let (world, prior) = (|change| self.walk(change), &self.start(guess)?);
+                Level { world, prior, period }.calibrate(instants, change, noises)
+            }
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! The filter on a grid that goes with the belief, against the Kalman filter, a fixed fine grid and particles.
+
+use fewbits_core::factor::{Levels, Value};
+use fewbits_core::{Belief, Cell, Gaussian, Likelihood, Observed};
+use fewbits_filters::{BootstrapFilter, Error, MomentFilter, MovingGridFilter, ResamplingRule, StateFilter};
+use fewbits_models::{ContinuousLinear, LinearSensor};
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+
+fn step<F: StateFilter<1>>(
+    filter: &mut F,
+    rng: &mut Pcg64Mcg,
+    world: &ContinuousLinear<1>,
+    belief: &mut F::Belief,
+    seen: (f64, &dyn Likelihood<1>),
+) -> f64 {
+    filter.predict(rng, &world.over(seen.0).unwrap(), belief).unwrap();
+    filter.update(rng, belief, &[seen.1]).unwrap().log_likelihood
+}
+
+/// With values it is the Kalman filter: sharp and blunt ones, far ones, at all distances in time, in every unit.
+#[test]
+fn with_values_it_is_the_kalman_filter() {
+    for unit in [1e-6, 1.0, 1e6] {
+        let world = ContinuousLinear::random_walk(0.04 * unit * unit).unwrap();
+        let returning = ContinuousLinear::ornstein_uhlenbeck(20.0 * unit, 30.0, 4.0 * unit * unit).unwrap();
+        for world in [world, returning] {
+            let mut rng = Pcg64Mcg::seed_from_u64(1);
+            let prior = Gaussian::scalar(20.0 * unit, 25.0 * unit * unit).unwrap();
+            let (mut grid, mut exact) = (MovingGridFilter, MomentFilter);
+            let (mut one, mut other) = (grid.start(&mut rng, &prior).unwrap(), prior);
+            for k in 0..200 {
+                let value = 20.0 + 2.0 * (f64::from(k) * 0.1).sin();
+                let deviation = [0.003, 0.3, 3.0][k as usize % 3];
+                let seconds = [0.01, 1.0, 400.0][(k as usize / 3) % 3];
+                let value = Value::scalar(value * unit, (deviation * unit).powi(2)).unwrap();
+                let seen = Observed::new(LinearSensor::direct((deviation * unit).powi(2)).unwrap(), value);
+                let logs = [
+                    step(&mut grid, &mut rng, &world, &mut one, (seconds, &seen)),
+                    step(&mut exact, &mut rng, &world, &mut other, (seconds, &seen)),
+                ];
+                let (variance, known) = (one.covariance()[0], other.covariance()[0]);
+                assert!((one.mean()[0] - other.mean()[0]).abs() < 0.03 * known.sqrt(), "{k} {unit}");
+                assert!((variance / known - 1.0).abs() < 0.05, "{k} {unit}: {variance} {known}");
+                assert!((logs[0] - logs[1]).abs() < 0.05, "{k} {unit}: {logs:?}");
+            }
+        }
+    }
+}
+
+/// Silence within a cell, again and again: the belief is that of 400 000 particles, whose variance that of Gaussian moments is far below.
+#[test]
+fn silence_leaves_the_exact_belief() {
+    let world = ContinuousLinear::random_walk(0.0025).unwrap();
+    let mut rng = Pcg64Mcg::seed_from_u64(2);
+    let prior = Gaussian::scalar(0.0, 0.0025).unwrap();
+    let (mut grid, mut moments) = (MovingGridFilter, MomentFilter);
+    let mut cloud = BootstrapFilter::new(ResamplingRule::default(), 400_000).unwrap();
+    let mut one = grid.start(&mut rng, &prior).unwrap();
+    let mut other = cloud.start(&mut rng, &prior).unwrap();
+    let mut gaussian = prior;
+    let cell = Levels::certain(Cell::new(-0.5, 0.5).unwrap(), 0.0025).unwrap();
+    let seen = Observed::new(LinearSensor::direct(0.0025).unwrap(), cell);
+    for _ in 0..150 {
+        step(&mut grid, &mut rng, &world, &mut one, (1.0, &seen));
+        step(&mut cloud, &mut rng, &world, &mut other, (1.0, &seen));
+        step(&mut moments, &mut rng, &world, &mut gaussian, (1.0, &seen));
+    }
+    let (own, drawn) = (one.covariance()[0], other.covariance()[0]);
+    assert!((own / drawn - 1.0).abs() < 0.02 && one.mean()[0].abs() < 1e-9, "{own} {drawn}");
+    assert!(gaussian.covariance()[0] < 0.9 * own, "{gaussian:?} {own}");
+    // Draws have the moments.
+    let mut states = vec![0.0; 100_000];
+    one.sample_columns(&mut rng, [&mut states]);
+    let square = states.iter().map(|state| state * state).sum::<f64>() / 1e5;
+    assert!((square / own - 1.0).abs() < 0.02, "{square} {own}");
+}
+
+#[test]
+fn what_cannot_be_leaves_the_belief_as_it_was() {
+    let mut rng = Pcg64Mcg::seed_from_u64(3);
+    let mut grid = MovingGridFilter;
+    let mut belief = grid.start(&mut rng, &Gaussian::scalar(0.0, 1.0).unwrap()).unwrap();
+    let before = belief.clone();
+    let far = Levels::certain(Cell::new(1e9, 2e9).unwrap(), 1.0).unwrap();
+    let seen = Observed::new(LinearSensor::direct(1.0).unwrap(), far);
+    if let Err(error) = grid.update(&mut rng, &mut belief, &[&seen]) {
+        assert!(matches!(error, Error::Impossible), "{error}");
+        assert_eq!(belief, before);
+    }
+    assert!(belief.mean()[0].is_finite());
+}

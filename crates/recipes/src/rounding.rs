@@ -1,0 +1,47 @@
+//! The step to which a sensor rounds its values.
+
+/// A sensor is taken to round if its noise with rounding is at most this many steps.
+const COARSE: f64 = 0.75;
+/// Values from which a step is found, at least, and changes from one to the next among them.
+const FEWEST: usize = 50;
+const FEWEST_CHANGES: usize = 4;
+/// Standard deviation of rounding to a step, in steps.
+pub const DEVIATION: f64 = 0.288_675_134_594_812_9;
+
+/// The step to which values are rounded, if there is one: not finer than their decimals. Values that hardly ever change may all be multiples of
+/// a larger step by chance: theirs is that of their decimals.
+pub fn step(values: &[f64]) -> Option<f64> {
+    let decimals = (0..=9).map(|decimals| 0.1_f64.powi(decimals)).find(|unit| {
+        let off = |value: &f64| (value / unit - (value / unit).round()).abs();
+        values.iter().all(|value| off(value) < 1e-6)
+    });
+    let step = fewbits_adaptive::own_steps(values).into_iter().reduce(f64::min)?;
+    let is_known = values.windows(2).filter(|pair| pair[0] != pair[1]).count() >= FEWEST_CHANGES;
+    Some(match decimals {
+        Some(unit) if is_known => unit.max(step),
+        Some(unit) => unit.min(step),
+        None => step,
+    })
+}
+
+/// The same if it is so coarse that a value is better taken as a cell than as a number with noise. `noise`: the standard deviation of that, rounding
+/// included.
+pub fn coarse_step(values: &[f64], noise: f64) -> Option<f64> {
+    let step = step(values)?;
+    (values.len() >= FEWEST && noise <= COARSE * step).then_some(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_is_found_where_it_is_coarser_than_the_noise() {
+        let values: Vec<f64> = (0..200).map(|k| (f64::from(k) * 0.37).sin() * 4.0).collect();
+        let rounded: Vec<f64> = values.iter().map(|value| (2.0 * value).round() / 2.0).collect();
+        assert_eq!(coarse_step(&rounded, 0.2), Some(0.5));
+        assert_eq!(coarse_step(&rounded, 2.0), None);
+        assert_eq!(coarse_step(&rounded[..20], 0.2), None);
+        assert_eq!(coarse_step(&values, 0.2), None);
+    }
+}
