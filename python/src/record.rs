@@ -158,8 +158,9 @@ impl Taken {
 /// Writes a table into a recording, each cell within the bound of its column. Returns the number of bytes.
 ///
 /// `table` is anything with `__arrow_c_stream__`. `time` names its column of times: timestamps, or numbers of seconds; without it rows are
-/// numbered. `bounds` is a number, a text such as "±0.1", "1%", "decimals:3" or "temp=±0.1,*=lossless", or a dictionary of these by column,
-/// with "*" for all others. Nulls and NaN return as they are. The file is complete or, after an error, as it was before.
+/// numbered. The recording keeps its name, and whether timestamps have a zone. `bounds` is a number, a text such as "±0.1", "1%", "decimals:3" or "temp=±0.1,*=lossless", or a dictionary of these by column,
+/// with "*" for all others. Nulls and NaN return as they are; whole numbers that no
+/// double holds are exact. The file is complete or, after an error, as it was before.
 ///
 /// >>> import pyarrow as pa, fewbits as fb, tempfile, os
 /// >>> path = os.path.join(tempfile.mkdtemp(), "room.fewb")
@@ -167,7 +168,7 @@ impl Taken {
 /// >>> size = fb.write(table, path, time="t", bounds={"temp": 0.05})
 /// >>> back = fb.read(path)
 /// >>> back.columns, len(back), bool(abs(back["temp"][0] - 20.11) <= 0.05)
-/// (['time', 'temp', 'door'], 3, True)
+/// (['t', 'temp', 'door'], 3, True)
 /// >>> fb.verify(table, path, time="t")["holds"]
 /// True
 #[pyfunction]

@@ -150,6 +150,7 @@ async function take(name, bytes) {
     document.body.dataset.packed = "failed";
     return;
   }
+  get("table-state").textContent = `${name}: packing ${table.rows} rows of ${table.columns.length} columns …`;
   get("drawn").replaceChildren(...table.columns.map((column, i) => new Option(column.name, i)));
   get("drawn").value = Math.max(0, table.columns.findIndex((column) => column.kind === "number" && column.max > column.min));
   // Fewer bits take some ten times the time: large tables begin without.
@@ -249,6 +250,8 @@ function showPlan() {
 async function takeFile(file) {
   if (!file) return;
   choose(get("tab-table"));
+  // What was said of a table holds for it: the next file begins without, unless something was said since.
+  if (table && JSON.stringify(table.said) === JSON.stringify(said())) get("said").reset();
   try {
     await take(file.name, new Uint8Array(await file.arrayBuffer()));
   } catch (error) {
