@@ -41,7 +41,7 @@ assert fb.verify(frame, "room.fewb", time="time")["holds"]
 recording = fb.open("room.fewb")
 print(recording.rows, recording.bounds)
 day = pl.DataFrame(recording.select(["temperature"], start="2026-01-02", end="2026-01-03"))
-original = frame.filter(pl.col("time").is_between(day["time"][0].replace(tzinfo=None), day["time"][-1].replace(tzinfo=None)))
+original = frame.filter(pl.col("time").is_between(day["time"][0], day["time"][-1]))
 error = np.abs(day["temperature"].to_numpy() - original["temperature"].to_numpy())
 assert error.max() <= 0.05
 

@@ -5,7 +5,7 @@ use crate::instants::Instant;
 use crate::model::with_dimension;
 use crate::parts::Parts;
 use crate::seat::Seat;
-use crate::step::{Built, Row, Rows};
+use crate::step::{Built, Row, Rows, Smooth};
 use pyo3::prelude::*;
 
 /// Rows between two looks at signals such as Ctrl-C.
@@ -20,7 +20,7 @@ pub(crate) trait Live: Send + Sync {
     fn step(&mut self, instant: &Instant) -> Outcome<Row>;
 
     /// All instants, one after the other. Ctrl-C is heard.
-    fn run(&mut self, instants: &[Instant], smooth: bool) -> Outcome<Rows>;
+    fn run(&mut self, instants: &[Instant], smooth: Smooth) -> Outcome<Rows>;
 
     /// Mean and rows of the covariance.
     fn moments(&self) -> (Vec<f64>, Vec<Vec<f64>>);
@@ -51,7 +51,7 @@ impl<const D: usize> Live for Built<D> {
         done
     }
 
-    fn run(&mut self, instants: &[Instant], smooth: bool) -> Outcome<Rows> {
+    fn run(&mut self, instants: &[Instant], smooth: Smooth) -> Outcome<Rows> {
         let before = self.state();
         let done = over(self, instants, smooth);
         if done.is_err() {
@@ -76,7 +76,7 @@ impl<const D: usize> Live for Built<D> {
     }
 }
 
-fn over<const D: usize>(built: &mut Built<D>, instants: &[Instant], smooth: bool) -> Outcome<Rows> {
+fn over<const D: usize>(built: &mut Built<D>, instants: &[Instant], smooth: Smooth) -> Outcome<Rows> {
     let mut rows = Rows::new::<D>(instants.len());
     let mut trail = Vec::new();
     for (number, instant) in instants.iter().enumerate() {
@@ -86,12 +86,12 @@ fn over<const D: usize>(built: &mut Built<D>, instants: &[Instant], smooth: bool
         let from = built.time();
         let (scale, row): (f64, Row) = (built.noise_scale(), Built::step(built, instant)?);
         rows.push(&built.belief(), row);
-        if smooth {
+        if smooth != Smooth::No {
             trail.push(built.mark(from, scale, rows.restarted()));
         }
     }
-    if smooth {
-        rows.smoothed = Some(built.smoothed(&trail)?);
+    if smooth != Smooth::No {
+        rows.smoothed = Some(built.smoothed(&trail, smooth)?);
     }
     Ok(rows)
 }

@@ -1,14 +1,14 @@
 //! Recordings: any table into a file within stated bounds, and back.
 
+use crate::clock::clock;
 use crate::error::{Outcome, refused};
 use crate::table::{Cells, Given, Table, doubles};
 use arrow_array::{ArrayRef, StringArray};
-use arrow_schema::{DataType, TimeUnit};
+use arrow_schema::DataType;
 use fewbits_recipes::bounds::{self, Spec};
 use fewbits_recipes::source::{Batch, Columns};
 use fewbits_recipes::{Error as RecipeError, Progress};
-use fewbits_record::arrow::ticks;
-use fewbits_record::{Playback, Recorder, Schema, TimeBase, TimeFormat};
+use fewbits_record::{Column, Integers, Playback, Recorder, Schema, TimeBase};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::BTreeMap;
@@ -17,9 +17,6 @@ use std::io::{BufReader, BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// Largest number of decimals of seconds.
-pub(crate) const MAX_DECIMALS: u8 = 9;
 
 /// Looks at signals such as Ctrl-C between batches; the first exception is kept for the caller.
 fn watch(stopped: &mut Option<PyErr>) -> impl FnMut(Progress) -> ControlFlow<()> {
@@ -83,7 +80,10 @@ impl Stated {
 /// A table as a recording takes it.
 struct Taken {
     names: Vec<String>,
+    /// Numbers; of whole numbers that no double holds their codes, which count from the smallest.
     columns: Vec<Cells>,
+    /// These whole numbers.
+    whole: Vec<Option<Vec<Option<i64>>>>,
     time: TimeBase,
     ticks: Option<Vec<i64>>,
 }
@@ -102,7 +102,15 @@ impl Taken {
             let expected = "numbers: name the column of times in `time`, and leave out others";
             return refused("column", format!("'{stamps}' of times"), expected);
         }
-        let columns = names.iter().map(|name| given.numbers(name)).collect::<Outcome<_>>()?;
+        let (mut columns, mut whole) = (Vec::with_capacity(names.len()), Vec::with_capacity(names.len()));
+        for name in &names {
+            let numbers = given.whole(name)?;
+            columns.push(match &numbers {
+                Some(numbers) => codes(numbers, from_least(numbers)),
+                None => given.numbers(name)?,
+            });
+            whole.push(numbers);
+        }
         let (time, ticks) = match time {
             Some(name) => {
                 let (base, ticks) = clock(given, name)?;
@@ -113,9 +121,20 @@ impl Taken {
         Ok(Self {
             names,
             columns,
+            whole,
             time,
             ticks,
         })
+    }
+
+    /// The columns of the recording: whole numbers that no double holds are exact, whatever bound is stated.
+    fn with_whole(&self, columns: Vec<Column>) -> Outcome<Vec<Column>> {
+        let columns = columns.into_iter().zip(&self.whole);
+        let column = |(column, whole): (Column, &Option<Vec<Option<i64>>>)| match whole {
+            Some(numbers) => Ok(Column::of_integers(column.name(), from_least(numbers).origin())?),
+            None => Ok(column),
+        };
+        columns.map(column).collect()
     }
 
     fn ranges(&self) -> Vec<Option<(f64, f64)>> {
@@ -136,50 +155,12 @@ impl Taken {
     }
 }
 
-/// The time base and the ticks of a column: timestamps in their own unit, dates as their midnights, numbers as seconds with as many decimals
-/// as they have.
-pub(crate) fn clock(given: &Given, name: &str) -> Outcome<(TimeBase, Vec<i64>)> {
-    let base = |decimals, format| TimeBase::Clock {
-        decimals,
-        format,
-        tolerance: 0,
-    };
-    let decimals = match given.kind(name)? {
-        DataType::Timestamp(TimeUnit::Second, _) | DataType::Date32 => Some(0),
-        DataType::Timestamp(TimeUnit::Millisecond, _) | DataType::Date64 => Some(3),
-        DataType::Timestamp(TimeUnit::Microsecond, _) => Some(6),
-        DataType::Timestamp(TimeUnit::Nanosecond, _) => Some(9),
-        _ => None,
-    };
-    if let Some(decimals) = decimals {
-        let mut all = Vec::new();
-        for column in given.arrays(name)? {
-            all.extend(ticks(name, column, decimals)?);
-        }
-        return Ok((base(decimals, TimeFormat::Utc), all));
-    }
-    let Some(seconds) = given.numbers(name)?.into_iter().collect::<Option<Vec<f64>>>() else {
-        return refused("time", format!("'{name}' with gaps"), "a time in every row");
-    };
-    for decimals in 0..=MAX_DECIMALS {
-        let scale = 10_f64.powi(decimals.into());
-        // The quotient of two exact doubles is rounded once, so it is the number that was written with these decimals.
-        let tick = |x: &f64| {
-            let tick = (x * scale).round();
-            (tick.abs() < 9e15 && tick / scale == *x).then_some(tick as i64)
-        };
-        if let Some(ticks) = seconds.iter().map(tick).collect::<Option<Vec<_>>>() {
-            return Ok((base(decimals, TimeFormat::Seconds), ticks));
-        }
-    }
-    refused("time", format!("'{name}'"), "seconds of at most 9 decimals, or timestamps: round them first")
-}
-
 /// Writes a table into a recording, each cell within the bound of its column. Returns the number of bytes.
 ///
 /// `table` is anything with `__arrow_c_stream__`. `time` names its column of times: timestamps, or numbers of seconds; without it rows are
-/// numbered. `bounds` is a number, a text such as "±0.1", "1%", "decimals:3" or "temp=±0.1,*=lossless", or a dictionary of these by column,
-/// with "*" for all others. Nulls and NaN return as they are. The file is complete or, after an error, as it was before.
+/// numbered. The recording keeps its name, and whether timestamps have a zone. `bounds` is a number, a text such as "±0.1", "1%", "decimals:3" or "temp=±0.1,*=lossless", or a dictionary of these by column,
+/// with "*" for all others. Nulls and NaN return as they are; whole numbers that no
+/// double holds are exact. The file is complete or, after an error, as it was before.
 ///
 /// >>> import pyarrow as pa, fewbits as fb, tempfile, os
 /// >>> path = os.path.join(tempfile.mkdtemp(), "room.fewb")
@@ -187,7 +168,7 @@ pub(crate) fn clock(given: &Given, name: &str) -> Outcome<(TimeBase, Vec<i64>)> 
 /// >>> size = fb.write(table, path, time="t", bounds={"temp": 0.05})
 /// >>> back = fb.read(path)
 /// >>> back.columns, len(back), bool(abs(back["temp"][0] - 20.11) <= 0.05)
-/// (['time', 'temp', 'door'], 3, True)
+/// (['t', 'temp', 'door'], 3, True)
 /// >>> fb.verify(table, path, time="t")["holds"]
 /// True
 #[pyfunction]
@@ -203,8 +184,8 @@ pub(crate) fn write(
     let effort = crate::codec::effort(effort)?;
     let taken = Taken::of(&Given::read(table)?, time)?;
     let specs = bounds.of(&taken.names)?;
-    let columns = bounds::columns(&taken.names, &specs, &taken.ranges())?;
-    let schema = Schema::new(columns, taken.time)?;
+    let columns = taken.with_whole(bounds::columns(&taken.names, &specs, &taken.ranges())?)?;
+    let schema = Schema::new(columns, taken.time)?.with_time_name(time.unwrap_or_default())?;
     py.detach(|| {
         let folder = path
             .parent()
@@ -224,6 +205,18 @@ pub(crate) fn write(
     })
 }
 
+/// The codes of whole numbers that count from the smallest.
+fn from_least(numbers: &[Option<i64>]) -> Integers {
+    Integers::from_origin(numbers.iter().flatten().min().copied().unwrap_or(0))
+}
+
+fn codes(numbers: &[Option<i64>], integers: Integers) -> Cells {
+    numbers
+        .iter()
+        .map(|number| number.map(|number| integers.code(number)))
+        .collect()
+}
+
 pub(crate) fn opened(path: &Path) -> Outcome<Playback<BufReader<File>>> {
     Ok(Playback::opened(BufReader::new(File::open(path)?), path)?)
 }
@@ -241,6 +234,19 @@ pub(crate) fn opened(path: &Path) -> Outcome<Playback<BufReader<File>>> {
 pub(crate) fn plan(py: Python<'_>, table: &Bound<'_, PyAny>, time: Option<&str>) -> Outcome<Table> {
     let taken = Taken::of(&Given::read(table)?, time)?;
     let (names, base) = (taken.names.clone(), taken.time);
+    // Codes are distances from the smallest number where these are doubles.
+    let near = |numbers: &Option<Vec<Option<i64>>>| {
+        numbers.as_ref().is_none_or(|numbers| {
+            let integers = from_least(numbers);
+            let largest = numbers.iter().flatten().max().copied().unwrap_or(0);
+            largest
+                .checked_sub(integers.origin())
+                .is_some_and(|width| width <= 1 << 53)
+        })
+    };
+    if let Some((name, _)) = names.iter().zip(&taken.whole).find(|(_, numbers)| !near(numbers)) {
+        return refused("column", format!("'{name}'"), "whole numbers within 53 bits of each other: leave it out");
+    }
     let planned = py.detach(|| {
         let mut stopped = None;
         let batch = Batch {
@@ -298,11 +304,20 @@ pub(crate) fn verify<'py>(
         .iter()
         .map(|name| playback.schema().position(name))
         .collect::<Result<Vec<_>, _>>()?;
-    for (cells, index) in taken.columns.iter_mut().zip(&matches) {
+    for ((cells, whole), index) in taken.columns.iter_mut().zip(&taken.whole).zip(&matches) {
+        let column = &playback.schema().columns()[*index];
         // A column of whole numbers has codes of these.
-        if let Some(integers) = playback.schema().columns()[*index].integers() {
-            let code = |number: f64| integers.code_of(number).unwrap_or(f64::NAN);
-            cells.iter_mut().flatten().for_each(|cell| *cell = code(*cell));
+        match (column.integers(), whole) {
+            (Some(integers), Some(numbers)) => *cells = codes(numbers, integers),
+            (Some(integers), None) => {
+                let code = |number: f64| integers.code_of(number).unwrap_or(f64::NAN);
+                cells.iter_mut().flatten().for_each(|cell| *cell = code(*cell));
+            }
+            (None, Some(_)) => {
+                let given = format!("'{}' of whole numbers of more than 53 bits", column.name());
+                return refused("column", given, "numbers that doubles hold, as the recording's");
+            }
+            (None, None) => {}
         }
     }
     let verdict = py.detach(|| {

@@ -1,7 +1,8 @@
 //! Recordings that are written row by row, and the times of their rows.
 
+use crate::clock::{MAX_DECIMALS, ticked};
 use crate::error::{Failure, Outcome, refused};
-use crate::record::{MAX_DECIMALS, Stated};
+use crate::record::Stated;
 use crate::table::Given;
 use fewbits_recipes::bounds;
 use fewbits_record::{Schema, TimeBase, TimeFormat};
@@ -96,13 +97,14 @@ impl Recorder {
         Ok(recorder.push(tick, &row)?)
     }
 
-    /// Adds the rows of a table: every column of the recording, and `time` (timestamps, or whole ticks) unless rows are numbered.
+    /// Adds the rows of a table: every column of the recording, and the times (timestamps, or numbers of seconds) unless rows are numbered.
     fn push_table(&mut self, py: Python<'_>, table: &Bound<'_, PyAny>) -> Outcome<()> {
         let given = Given::read(table)?;
         let recorder = self.open()?;
         py.detach(|| {
+            let schema = recorder.schema().clone();
             for batch in given.batches() {
-                recorder.push_batch(batch)?;
+                recorder.push_batch(&ticked(batch, &schema)?)?;
                 Python::attach(|py| py.check_signals())?;
             }
             Ok::<(), Failure>(())
@@ -162,6 +164,9 @@ pub(crate) fn tick_of(value: &Bound<'_, PyAny>, name: &'static str, time: TimeBa
     let numpy = value.py().import("numpy")?;
     // An aware datetime is taken to UTC first: NumPy knows no zones.
     let given = match value.getattr("tzinfo") {
+        Ok(zone) if !zone.is_none() && matches!(format, TimeFormat::Local) => {
+            return refused(name, value, "a time without a zone, as those of the recording");
+        }
         Ok(zone) if !zone.is_none() => {
             let utc = value.py().import("datetime")?.getattr("timezone")?.getattr("utc")?;
             let plain = value.call_method1("astimezone", (utc,))?;

@@ -1,5 +1,6 @@
 //! Recordings that are open: rows by time and column, read when they are asked for.
 
+use crate::clock;
 use crate::error::{Outcome, refused};
 use crate::record::opened;
 use crate::recorder::tick_of;
@@ -8,7 +9,7 @@ use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::{Array, RecordBatch, RecordBatchReader};
 use arrow_schema::{ArrowError, Field, SchemaRef};
 use fewbits_recipes::bounds;
-use fewbits_record::{Block, Schema};
+use fewbits_record::{Block, Schema, TimeBase};
 use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
 use std::collections::BTreeMap;
@@ -108,11 +109,16 @@ impl Recording {
         self.finished
     }
 
+    /// Whether rows have numbers in place of times.
+    #[getter]
+    fn numbered(&self) -> bool {
+        self.schema.time() == TimeBase::Numbered
+    }
+
     /// Names of the columns; the first is the time, or the number of the row.
     #[getter]
     fn columns(&self) -> Vec<String> {
-        self.schema
-            .to_arrow()
+        clock::fields(&self.schema)
             .fields()
             .iter()
             .map(|field| field.name().clone())
@@ -139,8 +145,8 @@ impl Recording {
 
     /// The rows between two times (`start` included, `end` excluded) in some columns, read when they are asked for.
     ///
-    /// `start` and `end` are numbers of seconds, row numbers if the recording has no times, or what `numpy.datetime64` takes if its clock is
-    /// UTC. Blocks outside are not decoded.
+    /// `start` and `end` are numbers of seconds, row numbers if the recording has no times, or what `numpy.datetime64` takes if its times
+    /// are timestamps. Blocks outside are not decoded.
     #[pyo3(signature = (columns=None, *, start=None, end=None))]
     fn select(
         &self,
@@ -255,7 +261,7 @@ impl Rows {
     /// The fields of the result, and a reader whose blocks another thread decodes ahead.
     fn batches(&self) -> Outcome<Batches> {
         let places: Vec<usize> = std::iter::once(0).chain(self.chosen.iter().map(|at| at + 1)).collect();
-        let fields = Arc::new(self.schema.to_arrow().project(&places)?);
+        let fields = Arc::new(clock::fields(&self.schema).project(&places)?);
         let mut playback = opened(&self.path)?;
         if *playback.schema() != self.schema {
             return refused("path", self.path.display(), "the recording that was opened: another is there now");
@@ -264,7 +270,7 @@ impl Rows {
         let names: Vec<&str> = self.chosen.iter().map(|at| schema.columns()[*at].name()).collect();
         playback.columns(&names)?;
         let (sender, receiver) = sync_channel(AHEAD);
-        let (none, damaged) = (self.chosen.is_empty(), self.damaged);
+        let (none, damaged, own) = (self.chosen.is_empty(), self.damaged, fields.clone());
         let work = move || {
             for block in playback.blocks_between(from, to) {
                 let batch = block.and_then(|mut block| {
@@ -272,7 +278,8 @@ impl Rows {
                     if none {
                         block.columns.iter_mut().for_each(Vec::clear);
                     }
-                    block.to_record_batch(&schema)
+                    let batch = block.to_record_batch(&schema)?;
+                    Ok(clock::shown(&batch, &block.ticks, schema.time(), own.clone())?)
                 });
                 if batch.is_err() && damaged == Damaged::Skip {
                     continue;
@@ -342,7 +349,7 @@ fn keep_between(block: &mut Block, from: i64, to: i64) {
 
 /// Reads a recording, whole or some columns between two times (`start` included, `end` excluded), as a table.
 ///
-/// `start` and `end` are numbers of seconds, row numbers if the recording has no times, or what `numpy.datetime64` takes if its clock is UTC.
+/// `start` and `end` are numbers of seconds, row numbers if the recording has no times, or what `numpy.datetime64` takes if its times are timestamps.
 /// Blocks outside are not decoded.
 ///
 /// Raises `fewbits.DecodeError` if the file is no recording, or is damaged or not finished; with `damage="skip"` what can be read is returned.

@@ -19,9 +19,34 @@ use pyo3::types::PyDict;
 use std::sync::Arc;
 
 /// What is known of the sensor of a column.
-struct Sensor {
+pub(crate) struct Sensor {
     variance: f64,
     send: Sends,
+}
+
+/// The sensors of these columns: their noises, and what they send.
+pub(crate) fn sensors(
+    names: &[Option<&str>],
+    noise: &Bound<'_, PyAny>,
+    send: Option<&Bound<'_, PyAny>>,
+) -> Outcome<Vec<Sensor>> {
+    let variances = by_column("noise", noise, names, |given| match given.extract::<f64>() {
+        Ok(noise) if noise > 0.0 && noise.is_finite() && noise * noise > 0.0 => Ok(noise * noise),
+        Ok(noise) => refused("noise", noise, "a finite number above 0"),
+        Err(_) => refused("noise", shown(given), "a number, or numbers by column"),
+    })?;
+    let expected = "'value', 'bit' or 'word:2' to 'word:4'";
+    let sends = match send {
+        None => vec![Sends::Value; names.len()],
+        Some(send) => {
+            by_column("send", send, names, |given| match given.extract::<String>().map(|text| Sends::parsed(&text)) {
+                Ok(Ok(Sends::Silent(_))) | Err(_) => refused("send", shown(given), expected),
+                Ok(sends) => sends,
+            })?
+        }
+    };
+    let sensors = variances.into_iter().zip(sends);
+    Ok(sensors.map(|(variance, send)| Sensor { variance, send }).collect())
 }
 
 /// A filter of one dimension with its belief.
@@ -90,7 +115,7 @@ impl<const D: usize> Rule for Points<D> {
 }
 
 /// What the receiver learns of a sample under the predicted noise-free measurement, and the bits that it takes.
-fn said(sensor: &Sensor, sample: f64, predicted: &Gaussian<1>) -> Outcome<(Scalar, i64)> {
+pub(crate) fn said(sensor: &Sensor, sample: f64, predicted: &Gaussian<1>) -> Outcome<(Scalar, i64)> {
     fn through<S: Scheme<1, State = (), Factor = Scalar>>(
         scheme: &S,
         feedback: &S::Feedback,
@@ -171,22 +196,7 @@ impl SigmaPointFilter {
         let dimension = mean.len();
         let covariance = crate::model::covariance(deviation, covariance, dimension)?;
         let measures = Likelihoods::parsed("measure", measure)?;
-        let names = measures.names();
-        let variances = by_column("noise", noise, &names, |given| match given.extract::<f64>() {
-            Ok(noise) if noise > 0.0 && noise.is_finite() && noise * noise > 0.0 => Ok(noise * noise),
-            Ok(noise) => refused("noise", noise, "a finite number above 0"),
-            Err(_) => refused("noise", shown(given), "a number, or numbers by column"),
-        })?;
-        let sends = match send {
-            None => vec![Sends::Value; names.len()],
-            Some(send) => by_column("send", send, &names, |given| {
-                match given.extract::<String>().map(|text| Sends::parsed(&text)) {
-                    Ok(Ok(Sends::Silent(_))) => refused("send", shown(given), "'value', 'bit' or 'word:2' to 'word:4'"),
-                    Ok(sends) => sends,
-                    Err(_) => refused("send", shown(given), "'value', 'bit' or 'word:2' to 'word:4'"),
-                }
-            })?,
-        };
+        let sensors = sensors(&measures.names(), noise, send)?;
         let process = if process.is_callable() {
             Process::Function(process.clone().unbind())
         } else {
@@ -201,11 +211,10 @@ impl SigmaPointFilter {
         let rule: Box<dyn Rule> = with_dimension!(dimension, D => {
             Ok::<Box<dyn Rule>, Failure>(Box::new(Points::<D>::new(Filter::unscented(kappa)?, &mean, &covariance)?))
         })?;
-        let sensors = variances.into_iter().zip(sends);
         Ok(Self {
             transition: r#move.clone().unbind(),
             measures,
-            sensors: sensors.map(|(variance, send)| Sensor { variance, send }).collect(),
+            sensors,
             process,
             dimension,
             rule,
@@ -324,7 +333,7 @@ impl SigmaPointFilter {
     }
 }
 
-fn of_columns(py: Python<'_>, columns: Vec<Vec<f64>>) -> Outcome<Bound<'_, PyArray2<f64>>> {
+pub(crate) fn of_columns(py: Python<'_>, columns: Vec<Vec<f64>>) -> Outcome<Bound<'_, PyArray2<f64>>> {
     Ok(PyArray2::from_vec2(py, &columns).map_err(PyErr::from)?)
 }
 

@@ -34,6 +34,16 @@ pub(crate) struct Row {
     pub(crate) events: Vec<String>,
 }
 
+/// Which later rows a smoothed estimate takes in.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Smooth {
+    No,
+    /// All of them.
+    All,
+    /// Those of so many seconds.
+    Within(f64),
+}
+
 /// A filtered belief, and the prediction that led to it.
 pub(crate) struct Mark<const D: usize> {
     belief: Gaussian<D>,
@@ -199,31 +209,61 @@ impl<const D: usize> Built<D> {
         }
     }
 
-    /// Mean and deviation of each coordinate given all rows, by columns. A belief that was restarted says nothing of those before.
-    pub(crate) fn smoothed(&self, trail: &[Mark<D>]) -> Outcome<Vec<Vec<f64>>> {
+    /// Mean and deviation of each coordinate given later rows too, by columns. A belief that was restarted says nothing of those before.
+    pub(crate) fn smoothed(&self, trail: &[Mark<D>], smooth: Smooth) -> Outcome<Vec<Vec<f64>>> {
         let mut columns = vec![vec![0.0; trail.len()]; 2 * D];
-        let mut next: Option<(Gaussian<D>, &Mark<D>)> = None;
-        for (row, mark) in trail.iter().enumerate().rev() {
-            let belief = match &next {
-                Some((later, step)) if !step.restarted => {
-                    let moved = self.model.lasting(step.seconds)?;
-                    let dynamics = LinearGaussian::with_covariance(
-                        *moved.transition(),
-                        moved.noise_covariance() * step.noise_scale,
-                    )?;
-                    // The step of the smoother has no offset: it is taken off the mean of the later belief.
-                    let later = Gaussian::new(later.mean() - moved.offset(), *later.covariance())?;
-                    smooth_step(&dynamics, &mark.belief, &later)?
-                }
-                _ => mark.belief,
-            };
+        let mut keep = |row: usize, belief: &Gaussian<D>| {
             for i in 0..D {
                 columns[2 * i][row] = belief.mean()[i];
                 columns[2 * i + 1][row] = belief.covariance()[(i, i)].sqrt();
             }
-            next = Some((belief, mark));
+        };
+        let Smooth::Within(lag) = smooth else {
+            let Some(last) = trail.last() else {
+                return Ok(columns);
+            };
+            let mut belief = last.belief;
+            keep(trail.len() - 1, &belief);
+            for row in (0..trail.len() - 1).rev() {
+                belief = self.backward(&trail[row], &belief, &trail[row + 1])?;
+                keep(row, &belief);
+            }
+            return Ok(columns);
+        };
+        // The last row within the lag, and its distance from the first of them.
+        let (mut last, mut ahead) = (0, 0.0);
+        for row in 0..trail.len() {
+            if row > 0 {
+                ahead -= trail[row].seconds;
+            }
+            if last < row {
+                (last, ahead) = (row, 0.0);
+            }
+            // Distances are differences of rounded times.
+            while last + 1 < trail.len() && ahead + trail[last + 1].seconds <= lag * (1.0 + 1e-12) {
+                last += 1;
+                ahead += trail[last].seconds;
+            }
+            let mut belief = trail[last].belief;
+            for earlier in (row..last).rev() {
+                belief = self.backward(&trail[earlier], &belief, &trail[earlier + 1])?;
+            }
+            keep(row, &belief);
         }
         Ok(columns)
+    }
+
+    /// The belief of a row given those after it: `later` is that of the next row, `step`, given what follows.
+    fn backward(&self, mark: &Mark<D>, later: &Gaussian<D>, step: &Mark<D>) -> Outcome<Gaussian<D>> {
+        if step.restarted {
+            return Ok(mark.belief);
+        }
+        let moved = self.model.lasting(step.seconds)?;
+        let dynamics =
+            LinearGaussian::with_covariance(*moved.transition(), moved.noise_covariance() * step.noise_scale)?;
+        // The step of the smoother has no offset: it is taken off the mean of the later belief.
+        let later = Gaussian::new(later.mean() - moved.offset(), *later.covariance())?;
+        Ok(smooth_step(&dynamics, &mark.belief, &later)?)
     }
 }
 

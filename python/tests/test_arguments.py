@@ -51,6 +51,10 @@ def lattice():
     )
 
 
+def ensemble():
+    return fb.EnsembleFilter(np.array([[0.0, 1.0], [1.0, 0.0]]), lambda x, dt, rng: None, lambda x: x[0], noise=1.0, seed=1)
+
+
 def sigma(**given):
     made = {"process": np.eye(2), "noise": 1.0, "mean": [0.0, 0.0], "deviation": [1.0, 1.0], **given}
     return fb.SigmaPointFilter(lambda x, dt: None, lambda x: x[0], **made)
@@ -109,6 +113,13 @@ CALLS = {
     "LatticeFilter.marginal": (lambda *a: lattice().marginal(*a), ["coordinate"], []),
     "GridFilter.step": (lambda *a, **k: grid().step(*a, **k), ["observation"], ["dt"]),
     "GridFilter.run": (lambda *a, **k: grid().run(*a, **{"time": "t", **k}), ["table"], ["time"]),
+    "EnsembleFilter": (
+        lambda *a, **k: fb.EnsembleFilter(*a, **{"noise": 1.0, "seed": 1, **k}),
+        ["start", "move", "measure"],
+        ["noise", "seed", "send", "inflation"],
+    ),
+    "EnsembleFilter.step": (lambda *a, **k: ensemble().step(*a, **k), ["observation"], ["dt"]),
+    "EnsembleFilter.run": (lambda *a, **k: ensemble().run(*a, **{"time": "t", **k}), ["table"], ["time"]),
     "SigmaPointFilter": (
         lambda *a, **k: fb.SigmaPointFilter(*a, **{"process": np.eye(2), "noise": 1.0, "mean": [0.0, 0.0], "deviation": [1.0, 1.0], **k}),
         ["move", "measure"],
@@ -176,7 +187,7 @@ def test_any_arguments_of_files(name, data, tmp_path_factory):
         "read": lambda: fb.read(path, columns=draw("columns"), start=draw("start"), end=draw("end")),
         "verify": lambda: fb.verify(draw("table"), path, time=draw("time")),
         "open": lambda: fb.open(path).select(draw("columns"), start=draw("start")).read(),
-        "scan": lambda: fb.scan(path).filter(pl.col("time") > draw("limit")).collect(),
+        "scan": lambda: fb.scan(path).filter(pl.col("t") > draw("limit")).collect(),
         "Recorder": lambda: recorder(folder / "c", draw),
     }
     try:

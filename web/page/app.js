@@ -1,6 +1,6 @@
 const get = (id) => document.getElementById(id);
 const worker = new Worker(URL.createObjectURL(new Blob([get("worker").textContent], { type: "text/javascript" })));
-worker.postMessage({ module: Uint8Array.from(atob(MODULE), (c) => c.charCodeAt(0)) });
+worker.postMessage({ module: MODULE });
 
 const waiting = new Map();
 let questions = 0;
@@ -16,7 +16,7 @@ worker.onmessage = ({ data: { id, answer, problem } }) => {
   waiting.delete(id);
   problem === undefined ? resolve(answer) : reject(new Error(problem));
 };
-worker.onerror = (problem) => { get("table-problem").textContent = problem.message; };
+worker.onerror = (error) => { problem(error.message); };
 
 // Runs `work` once at a time; calls that come meanwhile become one more run.
 function latest(work) {
@@ -91,22 +91,66 @@ function said() {
   return { dialect, without: names(form.get("without")), tolerance: +form.get("tolerance"), numbered: form.get("tolerance") === "" };
 }
 
+// What a value of an option may be, where a message of the library gives one.
+const VALUES = { decimal: /^[.,]$/, thousands: /^.$/, quote: /^.?$/, comment: /^\S{0,2}$/, delimiter: /^(.|tab)$/, skip: /^\d+$/, encoding: /^\w[\w-]+$/,
+  "time-format": /^(?!and$|or$|if$|says$)[a-z]+$/, "time-zone": /^[+-]\d/ };
+// The options that a message speaks of as buttons: those with a value read the table again, one without leads to its field.
+function offers(message) {
+  const form = get("said"), all = [];
+  let end = -2;
+  for (const found of message.matchAll(/--([a-z][a-z-]*[a-z])(?: ('[^']*'|[^\s();]+))?/g)) {
+    const [, name, given] = found, field = form.elements[name];
+    if (!field) continue;
+    let value = given?.replace(/^'(.*)'$/, "$1").replace(/(.)[,:]$/, "$1"), text = `--${name}`;
+    if (field.type === "checkbox") value = true;
+    else if (value !== undefined && VALUES[name]?.test(value)) text += ` ${given.replace(/(.)[,:]$/, "$1")}`;
+    else value = undefined;
+    if (value !== undefined && found.index === end + 1) {
+      all.at(-1).text += ` ${text}`;
+      all.at(-1).sets.push([field, value]);
+    } else if (!all.some((offer) => offer.text === text)) all.push({ text, sets: value === undefined ? [] : [[field, value]], field });
+    end = value === undefined ? -2 : found.index + (field.type === "checkbox" ? name.length + 2 : found[0].length);
+  }
+  const buttons = all.map(({ text, sets, field }) => {
+    const button = document.createElement("button");
+    button.textContent = sets.length ? `read again with ${text}` : `to ${text}`;
+    button.onclick = () => {
+      get("reading").open = true;
+      if (!sets.length) { field.focus(); return; }
+      for (const [field, value] of sets) field.type === "checkbox" ? field.checked = value : field.value = value;
+      form.requestSubmit();
+    };
+    return button;
+  });
+  if (Object.values(said().dialect).length || said().without.length) {
+    const button = Object.assign(document.createElement("button"), { textContent: "read again without the options below" });
+    button.onclick = () => { form.reset(); form.requestSubmit(); };
+    buttons.push(button);
+  }
+  return buttons;
+}
+function problem(text) {
+  get("table-problem").textContent = text.length > 1000 ? `${text.slice(0, 1000)} …` : text;
+  get("offers").replaceChildren(...(text && table?.failed ? offers(text) : []));
+}
+
 async function take(name, bytes) {
-  get("table-problem").textContent = "";
+  problem("");
   get("table-state").textContent = `reading ${name} …`;
   const kept = { name, bytes, own: new Map(), said: said() };
   table = view = values = planned = undefined;
   try {
     table = { ...kept, ...await ask("open", { bytes, said: JSON.stringify(kept.said) }) };
-  } catch (problem) {
+  } catch (error) {
     table = { ...kept, failed: true };
     get("table-found").hidden = true;
     get("table-state").textContent = "";
-    get("table-problem").textContent = `${name}: ${problem.message}`;
+    problem(`${name}: ${error.message}`);
     get("reading").open = true;
     document.body.dataset.packed = "failed";
     return;
   }
+  get("table-state").textContent = `${name}: packing ${table.rows} rows of ${table.columns.length} columns …`;
   get("drawn").replaceChildren(...table.columns.map((column, i) => new Option(column.name, i)));
   get("drawn").value = Math.max(0, table.columns.findIndex((column) => column.kind === "number" && column.max > column.min));
   // Fewer bits take some ten times the time: large tables begin without.
@@ -125,14 +169,19 @@ const pack = latest(async () => {
     if (now !== table) return;
     now.packed = { ...packed, asked, effort };
     values = { ...shown, column };
-    get("table-problem").textContent = "";
+    problem("");
     showTable();
     const plan = await ask("plan", { column: values.column });
     if (now !== table) return;
     planned = { ...plan, column: values.column };
     showPlan();
-  } catch (problem) {
-    get("table-problem").textContent = problem.message;
+  } catch (error) {
+    if (now !== table) return;
+    if (!now.packed) {
+      get("table-state").textContent = "";
+      get("table-found").hidden = true;
+    }
+    problem(now.packed ? error.message : `${now.name}: ${error.message}`);
   }
   document.body.dataset.packed = asksDone();
 });
@@ -149,8 +198,12 @@ function notes() {
 function showTable() {
   if (!table?.packed) return;
   const { packed, time } = table, unit = (column) => column.unit && !column.words ? ` / ${column.unit}` : "", size = table.bytes.length;
-  get("table-state").textContent = `${table.name}: ${table.rows} rows, ${table.columns.length} columns. ${size} bytes become ${packed.bytes} (${+(100 * packed.bytes / size).toPrecision(3)} %). ` +
-    (time ? `Time ${time.columns.join(", ")} in ${time.scale}${time.from && `, ${time.from} to ${time.to}`}. ` : "Rows are numbered. ") + `Read as ${[table.format, table.dialect].filter(Boolean).join(", ")}.`;
+  const headline = document.createElement("strong"), read = document.createElement("span");
+  headline.textContent = `${table.name}: ${table.rows} rows, ${table.columns.length} columns. ${size} bytes become ${packed.bytes} (${+(100 * packed.bytes / size).toPrecision(3)} %). `;
+  read.className = "hint";
+  read.textContent = (time ? `Time ${time.columns.join(", ")} in ${time.scale}${time.from && `, ${time.from} to ${time.to}`}. ` : "Rows are numbered. ") +
+    `Read as ${[table.format, table.dialect].filter(Boolean).join(", ")}`;
+  get("table-state").replaceChildren(headline, read);
   get("notes").replaceChildren(...notes().map((text) => Object.assign(document.createElement("li"), { textContent: text })));
   get("columns").tBodies[0].innerHTML = table.columns.map((column, i) => {
     const cost = packed.columns[i], of = cost.bound.includes("%") || cost.bound.startsWith("decimals") ? ` = ±${short(cost.delta)}` : "", exact = column.words ? `${column.words.length} words` : cost.bound + of;
@@ -197,11 +250,13 @@ function showPlan() {
 async function takeFile(file) {
   if (!file) return;
   choose(get("tab-table"));
+  // What was said of a table holds for it: the next file begins without, unless something was said since.
+  if (table && JSON.stringify(table.said) === JSON.stringify(said())) get("said").reset();
   try {
     await take(file.name, new Uint8Array(await file.arrayBuffer()));
-  } catch (problem) {
+  } catch (error) {
     get("table-state").textContent = "";
-    get("table-problem").textContent = `${file.name} cannot be read: ${problem.message}`;
+    problem(`${file.name} cannot be read: ${error.message}`);
   }
 }
 get("file").onchange = ({ target }) => { takeFile(target.files[0]); target.value = ""; };

@@ -26,6 +26,9 @@ function cell(value, { zone, scale }) {
 const isUtc = ({ logical_type: logical, converted_type: converted }) =>
   logical?.type === "TIMESTAMP" ? logical.isAdjustedToUTC : /^TIMESTAMP/.test(converted ?? "");
 
+// The bytes of a file that zstd packed.
+export const unzstd = (bytes) => decompress(bytes);
+
 // The bytes of a CSV file. `gunzip` unpacks columns that are packed by gzip.
 export async function toCsv(bytes, gunzip) {
   const file = bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength), metadata = parquetMetadata(file);

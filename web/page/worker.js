@@ -6,7 +6,8 @@ const answers = {
     opened?.free();
     opened = undefined;
     const isParquet = typeof parquet !== "undefined" && [...bytes.subarray(0, 4)].join() === "80,65,82,49";
-    const rows = isParquet ? await ofParquet(bytes) : bytes;
+    const isZstd = typeof parquet !== "undefined" && [...bytes.subarray(0, 4)].join() === "40,181,47,253";
+    const rows = isParquet ? await ofParquet(bytes) : isZstd ? ofZstd(bytes) : bytes;
     opened = wasm_bindgen.Opened.read(rows, said);
     const found = JSON.parse(opened.summary());
     return isParquet ? { ...found, format: "Parquet", dialect: "", options: "" } : found;
@@ -31,6 +32,13 @@ const answers = {
   },
   design(setting) { return JSON.parse(wasm_bindgen.design(JSON.stringify(setting))); },
 };
+function ofZstd(bytes) {
+  try {
+    return parquet.unzstd(bytes);
+  } catch (problem) {
+    throw `the file is packed by zstd and damaged: ${problem.message ?? problem}`;
+  }
+}
 async function ofParquet(bytes) {
   try {
     return await parquet.toCsv(bytes, wasm_bindgen.gunzip);
@@ -38,13 +46,11 @@ async function ofParquet(bytes) {
     throw `the Parquet file is damaged or of a kind that cannot be read: ${problem.message ?? problem}`;
   }
 }
-async function compiled(packed) {
-  const module = new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip")));
-  return wasm_bindgen({ module_or_path: await module.arrayBuffer() });
-}
 onmessage = async ({ data: { id, question, given, module } }) => {
   if (module) {
-    ready = compiled(module);
+    const text = atob(module), packed = new Uint8Array(text.length);
+    for (let i = 0; i < text.length; i++) packed[i] = text.charCodeAt(i);
+    ready = wasm_bindgen({ module_or_path: unpack(packed) });
     return;
   }
   try {

@@ -275,7 +275,7 @@ pub fn ticks(name: &str, array: &dyn Array, decimals: u8) -> Result<Vec<i64>, Er
 }
 
 impl<W: Write> Recorder<W> {
-    /// Adds the rows of a batch. Its columns are found by name: `time` (or `row`) and every column of the schema; others are ignored.
+    /// Adds the rows of a batch. Its columns are found by name: the time's name or `time` (or `row`), and every column of the schema; others are ignored.
     /// Without times, each row follows the last one.
     ///
     /// # Errors
@@ -298,7 +298,11 @@ impl<W: Write> Recorder<W> {
                     .map(|i| self.next_tick().wrapping_add(i))
                     .collect(),
             },
-            TimeBase::Clock { decimals, .. } => ticks("time", array("time")?, decimals)?,
+            TimeBase::Clock { decimals, .. } => {
+                let own = self.schema().time_name();
+                let name = batch.column_by_name(own).map_or("time", |_| own);
+                ticks(name, array(name)?, decimals)?
+            }
         };
         let columns = self
             .schema()

@@ -10,8 +10,9 @@ const CHUNK: usize = 1 << 18;
 /// A source of bytes.
 pub(crate) type Bytes = Box<dyn Read + Send>;
 
+const NO_TABLE: &str = "give the table itself, as CSV";
 /// The first bytes of files that are no tables of text, what they are, and what to do.
-const OTHERS: [(&[u8], &str, &str); 13] = [
+const OTHERS: [(&[u8], &str, &str); 18] = [
     (b"\"TOB", "a binary file of Campbell Scientific", "convert it to TOA5 with CardConvert or LoggerNet"),
     (b"TOB1", "a binary file of Campbell Scientific", "convert it to TOA5 with CardConvert or LoggerNet"),
     (
@@ -35,6 +36,11 @@ const OTHERS: [(&[u8], &str, &str); 13] = [
     (b"\x89HDF", "an HDF5 or NetCDF-4 file", "export the table as CSV"),
     (b"CDF", "a NetCDF file", "export the table as CSV"),
     (b"SQLite format 3", "an SQLite database", "export the table as CSV"),
+    (b"\x89PNG", "a picture (PNG)", NO_TABLE),
+    (b"\xff\xd8\xff", "a picture (JPEG)", NO_TABLE),
+    (b"GIF8", "a picture (GIF)", NO_TABLE),
+    (b"%PDF", "a PDF document", NO_TABLE),
+    (b"\0\0\0\0", "a binary file", NO_TABLE),
     (b"BZh", "packed by bzip2", "unpack it first: bunzip2 -c FILE | fewbits ... -"),
     (b"\xfd7zXZ", "packed by xz", "unpack it first: xz -dc FILE | fewbits ... -"),
 ];

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import floor, isfinite
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -36,7 +37,7 @@ def scan(path: str | PathLike[str]) -> pl.LazyFrame:
     def source(
         columns: list[str] | None, predicate: pl.Expr | None, rows: int | None, _batch: int | None
     ) -> Iterator[pl.DataFrame]:
-        start, end = _range(predicate, key)
+        start, end = _range(predicate, key, recording.numbered)
         wanted = None
         if columns is not None:
             read = set(columns)
@@ -59,7 +60,7 @@ def scan(path: str | PathLike[str]) -> pl.LazyFrame:
     return register_io_source(source, schema=dict(schema), is_pure=True)
 
 
-def _range(predicate: pl.Expr | None, key: str) -> tuple[float | int | None, float | int | None]:
+def _range(predicate: pl.Expr | None, key: str, numbered: bool) -> tuple[float | int | None, float | int | None]:
     """A range of the column `key` that holds all rows of a predicate, not always the smallest.
 
     What is not understood restricts nothing: polars applies the predicate to the rows in any case.
@@ -80,8 +81,8 @@ def _range(predicate: pl.Expr | None, key: str) -> tuple[float | int | None, flo
     _walk(tree, key, lower, upper)
     start = max(lower) if lower else None
     end = min(upper) if upper else None
-    if key == "row":
-        return (None if start is None else int(start)), (None if end is None else int(end) + 1)
+    if numbered:
+        return (None if start is None else floor(start)), (None if end is None else floor(end) + 1)
     # A second more on both sides: seconds as doubles are not exact.
     return (None if start is None else start - 1.0), (None if end is None else end + 1.0)
 
@@ -103,11 +104,11 @@ def _limit(op: str, literal: Any, lower: list[float], upper: list[float]) -> Non
     match literal:
         case {"Scalar": {"Datetime": [int(ticks), str(unit), _]}}:
             value = ticks / _PER_SECOND.get(unit, float("nan"))
-        case {"Dyn": {"Int": int(whole)}} | {"Scalar": {"Int64": int(whole)}}:
-            value = float(whole)
+        case {"Dyn": {"Int": number}} | {"Dyn": {"Float": number}} | {"Scalar": {"Int64": number}} | {"Scalar": {"Float64": number}}:
+            value = float(number)
         case _:
             return
-    if value != value:
+    if not isfinite(value):
         return
     if op in ("Gt", "GtEq", "Eq"):
         lower.append(value)

@@ -174,6 +174,11 @@ fn other_files_are_named_with_the_mend() {
     for (bytes, word) in [
         (&b"PK\x03\x04...."[..], "Excel"),
         (b"SQLite format 3\0", "SQLite"),
+        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "a picture (PNG)"),
+        (b"\xff\xd8\xff\xe0\0\x10JFIF", "a picture (JPEG)"),
+        (b"GIF89a\x01\0", "a picture (GIF)"),
+        (b"%PDF-1.7\n%\xe2\xe3", "a PDF document"),
+        (b"\0\0\0\0\0\0\0\0\n", "a binary file"),
         (b"BZh91AY", "bunzip2"),
         (b"\xfd7zXZ\0", "xz -dc"),
         (b"[{\"a\": 1}]", "jq"),
