@@ -57,25 +57,6 @@ fn recorded_batches_are_recorded_again() {
     }
 }
 
-/// The times of a batch have their own name, beside a column that is called `time`.
-#[test]
-fn times_are_found_by_their_name() {
-    let time = TimeBase::Clock {
-        decimals: 0,
-        tolerance: 0,
-        format: TimeFormat::Utc,
-    };
-    let columns = vec![Column::new("time", fewbits_record::Bound::Lossless).unwrap()];
-    let schema = Schema::new(columns, time).unwrap().with_time_name("when").unwrap();
-    let whole = |numbers: [i64; 2]| Arc::new(Int64Array::from(numbers.to_vec())) as ArrayRef;
-    let mut recorder = Recorder::new(Vec::new(), schema);
-    let named = RecordBatch::try_from_iter([("time", whole([5, 6])), ("when", whole([10, 20]))]).unwrap();
-    recorder.push_batch(&named).unwrap();
-    let mut playback = Playback::new(Cursor::new(recorder.finish().unwrap())).unwrap();
-    let block = playback.blocks().next().unwrap().unwrap();
-    assert_eq!((block.ticks, &block.columns[0]), (vec![10, 20], &vec![Some(5.0), Some(6.0)]));
-}
-
 #[test]
 fn other_types_and_missing_columns() {
     let arrays = |count: ArrayRef| {
