@@ -179,9 +179,9 @@ fn lines() -> Receiver<(u64, std::io::Result<String>)> {
         for number in 1.. {
             let mut line = Vec::new();
             let read = (&mut input).take(MAX_LINE).read_until(b'\n', &mut line);
-            let is_over = !matches!(read, Ok(1..));
+            let (is_end, is_failed) = (matches!(read, Ok(0)), read.is_err());
             let line = read.map(|_| String::from_utf8_lossy(&line).into_owned());
-            if is_over && line.is_ok() || sender.send((number, line)).is_err() || is_over {
+            if is_end || sender.send((number, line)).is_err() || is_failed {
                 return;
             }
         }
