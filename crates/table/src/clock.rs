@@ -11,7 +11,7 @@ use crate::time::{Scale, Unit};
 use crate::written::{self, Clock, Order, Problem, Syntax};
 
 /// Names of a column that is taken as time, if no column has dates.
-const NAMES: [&str; 27] = [
+const NAMES: [&str; 33] = [
     "time",
     "timestamp",
     "datetime",
@@ -40,6 +40,12 @@ const NAMES: [&str; 27] = [
     "second",
     "sec",
     "t",
+    "t_s",
+    "t(s)",
+    "t (s)",
+    "t[s]",
+    "t [s]",
+    "t/s",
 ];
 /// Names of a column of times of day beside one of dates.
 const OF_DAY: [&str; 13] = [

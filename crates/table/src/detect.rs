@@ -246,6 +246,13 @@ fn layout(
         }),
         Some(data) => {
             let mut header = data - 1;
+            // A row of gaps is no line of names.
+            let is_gap = |i: &usize| looks[*i].iter().all(|look| *look == Look::Missing);
+            let above = (0..header).rev().find(|i| !is_gap(i));
+            let above = above.filter(|i| looks[*i].len() >= count && looks[*i].contains(&Look::Text));
+            if is_gap(&header) {
+                header = above.unwrap_or(header);
+            }
             // Lines of marks below the names, as programs of databases draw them.
             let mut rulers = 0;
             while header > 0 && marks::is_ruler(&rows[header].1) {

@@ -80,6 +80,32 @@ fn empty_cells_and_rows() {
     assert_eq!(rows(&mut open("time,x\n")).rows, 0);
 }
 
+/// A logger that began before its sensors did: gaps below the names are rows, and the names stay.
+#[test]
+fn rows_of_gaps_below_the_names_are_rows() {
+    let read = |text: &str| {
+        let mut table = open(text);
+        let names: Vec<String> = table.columns().iter().map(|column| column.name.clone()).collect();
+        let found = rows(&mut table);
+        (names.join(" "), found.columns.iter().map(numbers).collect::<Vec<_>>(), table.skipped().repeated)
+    };
+    let gap = [None, None, Some(1.0), None, Some(3.0)].to_vec();
+    for word in ["", "NaN", "NA"] {
+        let row = format!("{word},{word}\n");
+        let text = format!("a,b\n{row}{row}1,2\n{row}3,4\n");
+        assert_eq!(
+            read(&text),
+            ("a b".to_owned(), vec![gap.clone(), gap.iter().map(|x| x.map(|x| x + 1.0)).collect()], 0),
+            "{text}"
+        );
+    }
+    // Below a title and units, and with times, where such a row says nothing.
+    let (names, columns, _) = read("Station 7\na,b\nm,s\n,\n1,2\n");
+    assert_eq!((names.as_str(), &columns[0]), ("a b", &vec![None, Some(1.0)]));
+    let (names, columns, _) = read("time,a\n,\n2024-01-01T00:00:00Z,1\n");
+    assert_eq!((names.as_str(), columns.last()), ("a", Some(&vec![Some(1.0)])));
+}
+
 #[test]
 fn a_comment_that_may_be_a_row_is_not_dropped() {
     let text = "name,x\na,1\n#ff0000,2\nb,3\n";
