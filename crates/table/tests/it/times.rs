@@ -158,3 +158,13 @@ fn all_decimals_are_kept() {
     assert_eq!(Time::from_ticks(-568_080_000_000, 3).shown(Scale::Local, 0), "1952-01-01T00:00:00");
     assert_eq!(Time::from_ticks(i64::MIN, 0).ticks(1), None);
 }
+
+/// A count of seconds whose name says its unit.
+#[test]
+fn times_by_short_names_with_units() {
+    for name in ["t", "t_s", "T [s]", "t/s", "seconds"] {
+        let mut table = super::open(&format!("x,{name}\n4,0\n5,0.25\n7,0.5\n"));
+        assert!(table.time().is_some(), "{name}");
+        assert_eq!(read(&mut table).1, [0.0, 0.25, 0.5], "{name}");
+    }
+}
