@@ -17,32 +17,35 @@ const ALIGNMENTS: usize = 20;
 /// Values that are farther from the mean than this many of their median distances are left out.
 const FARTHEST: f64 = 6.0;
 
-/// Stretches of the instants, of which each is left out once.
-const STRETCHES: usize = 10;
+/// Pairs of neighbouring stretches of the instants. Of each pair a half sample has one stretch.
+const PAIRS: usize = 8;
+/// Half samples: rows of a Hadamard matrix, so that each pair of stretches is halved as often one way as the other, whatever happens to another pair.
+const HALVES: usize = 16;
 
 /// Standard deviation of what errors of the [`offsets`] shift a level, of which each sensor tells a share in proportion to its weight (one over the
-/// variance of its noise): found by leaving out one stretch of the instants after the other (jackknife). It is the same in all rows, so it belongs to
-/// the band of each. 0 of one sensor.
+/// variance of its noise): found from balanced half samples of the instants (McCarthy 1969), since a jackknife is wrong for medians. It is the same in
+/// all rows, so it belongs to the band of each. 0 of one sensor.
 pub fn shift_deviation(instants: &[Instant], weights: &[f64], period: Option<f64>) -> f64 {
     let sum: f64 = weights.iter().sum();
-    let count = STRETCHES.min(instants.len());
-    if count < 2 || weights.len() < 2 || sum <= 0.0 || !sum.is_finite() {
+    if instants.len() < 2 * PAIRS || weights.len() < 2 || sum <= 0.0 || !sum.is_finite() {
         return 0.0;
     }
-    let without = |stretch: usize| {
-        let (begin, end) = (stretch * instants.len() / count, (stretch + 1) * instants.len() / count);
-        let rest = [&instants[..begin], &instants[end..]].concat();
-        let found = offsets(&rest, weights.len(), period);
-        found
-            .iter()
-            .zip(weights)
-            .map(|(offset, weight)| offset * weight / sum)
-            .sum::<f64>()
+    let shift = |instants: &[Instant]| {
+        let found = offsets(instants, weights.len(), period);
+        let shares = found.iter().zip(weights).map(|(offset, weight)| offset * weight / sum);
+        shares.sum::<f64>()
     };
-    let shifts: Vec<f64> = (0..count).map(without).collect();
-    let mean = shifts.iter().sum::<f64>() / count as f64;
-    let squares: f64 = shifts.iter().map(|shift| (shift - mean) * (shift - mean)).sum();
-    (squares * (count - 1) as f64 / count as f64).sqrt()
+    let stretch = |number: usize| {
+        let [begin, end] = [number, number + 1].map(|edge| edge * instants.len() / (2 * PAIRS));
+        &instants[begin..end]
+    };
+    let half = |row: usize| {
+        let chosen = |pair: usize| stretch(2 * pair + (row & (pair + 1)).count_ones() as usize % 2);
+        (0..PAIRS).map(chosen).collect::<Vec<_>>().concat()
+    };
+    let all = shift(instants);
+    let squares = (0..HALVES).map(|row| (shift(&half(row)) - all).powi(2));
+    (squares.sum::<f64>() / HALVES as f64).sqrt()
 }
 
 /// The constant offset of each sensor among `sensors`, from the instants at which several measured. Their median is zero: nothing says what

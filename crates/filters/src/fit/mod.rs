@@ -12,6 +12,7 @@
 
 mod errors;
 mod filter;
+mod likelihood;
 mod model;
 mod parameters;
 mod problem;

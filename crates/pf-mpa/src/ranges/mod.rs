@@ -43,10 +43,9 @@ use fewbits_core::RangeNoise;
 use fewbits_numerics::error::{finite, refuse, within};
 use fit::Calibration;
 use gaussian::Step;
-use moved::Latest;
 use nalgebra::Vector3;
 use odds::{count_contradictions, drop_improbable, is_lost, merge_same, shares_of, uncertainty_of_noise};
-use rows::Collected;
+use rows::{Collected, Latest};
 use settings::{Known, NEGLIGIBLE_OF_LEVELS};
 use std::collections::BTreeMap;
 

@@ -4,41 +4,9 @@ use super::RangeTracker;
 use super::bank::Hypothesis;
 use super::estimate::RangeEstimate;
 use super::gaussian::Step;
-use super::rows::Collected;
 use crate::Error;
 use fewbits_numerics::error::{finite, refuse};
 use nalgebra::Vector3;
-
-/// The latest range in full of an anchor.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Latest {
-    pub(super) time: f64,
-    range: f64,
-    /// What the target moved since.
-    moved: [f64; 3],
-}
-
-impl Latest {
-    pub(super) fn new(time: f64, range: f64) -> Self {
-        Self {
-            time,
-            range,
-            moved: [0.0; 3],
-        }
-    }
-
-    /// The range as one that a place at `time` must explain. The target was where it is less what it moved: so the anchor is moved instead.
-    pub(super) fn seen_at(&self, time: f64, anchor: usize, place: &[f64; 3]) -> Collected {
-        let mut place = *place;
-        place.iter_mut().zip(&self.moved).for_each(|(x, by)| *x += by);
-        Collected {
-            anchor,
-            place,
-            range: self.range,
-            age: time - self.time,
-        }
-    }
-}
 
 impl RangeTracker {
     pub(super) fn check_time(&self, time: f64) -> Result<(), Error> {

@@ -10,6 +10,37 @@ pub(super) struct Collected {
     pub(super) age: f64,
 }
 
+/// The latest range in full of an anchor.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Latest {
+    pub(super) time: f64,
+    range: f64,
+    /// What the target moved since.
+    pub(super) moved: [f64; 3],
+}
+
+impl Latest {
+    pub(super) fn new(time: f64, range: f64) -> Self {
+        Self {
+            time,
+            range,
+            moved: [0.0; 3],
+        }
+    }
+
+    /// The range as one that a place at `time` must explain. The target was where it is less what it moved: so the anchor is moved instead.
+    pub(super) fn seen_at(&self, time: f64, anchor: usize, place: &[f64; 3]) -> Collected {
+        let mut place = *place;
+        place.iter_mut().zip(&self.moved).for_each(|(x, by)| *x += by);
+        Collected {
+            anchor,
+            place,
+            range: self.range,
+            age: time - self.time,
+        }
+    }
+}
+
 /// A slice of the positions: those whose coordinate along a direction is about `middle`. Slices whose middles are a deviation apart share out
 /// all positions.
 #[derive(Debug, Clone, Copy)]

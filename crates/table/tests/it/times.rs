@@ -163,7 +163,7 @@ fn all_decimals_are_kept() {
 #[test]
 fn times_by_short_names_with_units() {
     for name in ["t", "t_s", "T [s]", "t/s", "seconds"] {
-        let mut table = super::open(&format!("x,{name}\n4,0\n5,0.25\n7,0.5\n"));
+        let mut table = open(&format!("x,{name}\n4,0\n5,0.25\n7,0.5\n"));
         assert!(table.time().is_some(), "{name}");
         assert_eq!(read(&mut table).1, [0.0, 0.25, 0.5], "{name}");
     }
