@@ -8,7 +8,7 @@ use rand::{Rng, RngExt};
 
 /// Nodes of a new grid, and most nodes before it is made coarser.
 const NODES: usize = 241;
-const MOST: usize = 800;
+const MAX_NODES: usize = 800;
 /// A Gaussian is represented to so many deviations on each side.
 const REACH: f64 = 6.0;
 /// Distance between nodes in deviations of the noise of the dynamics, at least and at most, where the noise is spread over nodes.
@@ -141,7 +141,7 @@ impl MovingGrid {
         if grid.spacing < FINEST * deviation {
             grid = grid.coarser(FINEST * deviation);
         }
-        if grid.masses.len() > MOST {
+        if grid.masses.len() > MAX_NODES {
             let spacing = grid.spacing * grid.masses.len() as f64 / NODES as f64;
             grid = grid.coarser(spacing);
         }
