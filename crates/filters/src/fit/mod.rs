@@ -30,7 +30,7 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 
 /// Readings of a sensor from which anything is found, at least.
-const FEWEST: usize = 12;
+const MIN_READINGS: usize = 12;
 
 /// What is looked for, beside change, noises and biases.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -113,7 +113,7 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
             .iter()
             .flat_map(|instant| &instant.values)
             .filter(|one| one.0 == sensor);
-        if count.count() < FEWEST {
+        if count.count() < MIN_READINGS {
             refused.push(reason(Quantity::Noise(sensor), "it has fewer than 12 readings"));
             continue;
         }
@@ -189,7 +189,7 @@ fn is_constant(instants: &[Instant], sensor: usize) -> bool {
 
 /// The sensor to which all else is relative, and what cannot be found therefore.
 fn anchor(series: &[Vec<(f64, f64)>], instants: &[Instant], request: &Request) -> Result<(usize, Vec<Refusal>), Error> {
-    let of_values = |sensor: &usize| series[*sensor].len() >= FEWEST;
+    let of_values = |sensor: &usize| series[*sensor].len() >= MIN_READINGS;
     if let Some(reference) = request.reference {
         if reference >= series.len() || !of_values(&reference) {
             return refuse("reference", reference, "a sensor of at least 12 values");
