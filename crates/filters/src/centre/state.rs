@@ -120,7 +120,7 @@ impl StoredSlot {
 /// The state of a centre: everything except its models, its filter and its settings, which the program must provide again.
 ///
 /// It can be stored as bytes ([`to_bytes`](Self::to_bytes)) or in any format of serde. A restored centre continues with the same bits,
-/// given the same random stream, because floats are stored exactly in every format ([`mod@fewbits_numerics::stored`]).
+/// given the same random stream. JSON must be read by a parser that rounds correctly ([`mod@fewbits_numerics::stored`]).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CentreState<B> {
