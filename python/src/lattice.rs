@@ -5,7 +5,7 @@ use crate::callbacks::{Likelihoods, rising};
 use crate::error::{Failure, Outcome, refused};
 use crate::nodes::{Kept, callable, dt_of, step};
 use crate::table::{Given, Table, doubles};
-use fewbits_filters::{Lattice, LatticeFilter as Kernel, UniformGrid};
+use fewbits_filters::{Lattice, LatticeKernel as Kernel, UniformGrid};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 

@@ -2,7 +2,7 @@
 
 use crate::callbacks::{Likelihoods, returned};
 use crate::error::{Outcome, refused};
-use fewbits_filters::{Error, Lattice, LatticeFilter, PointMass, TransitionKernel};
+use fewbits_filters::{Error, Lattice, LatticeKernel, PointMass, TransitionKernel};
 use pyo3::prelude::*;
 
 /// A density at nodes, and the kernel that moves it.
@@ -30,9 +30,9 @@ impl OnNodes for PointMass {
 }
 
 impl OnNodes for Lattice {
-    type Kernel = LatticeFilter;
+    type Kernel = LatticeKernel;
 
-    fn predicted(&self, kernel: &LatticeFilter) -> Result<Self, Error> {
+    fn predicted(&self, kernel: &LatticeKernel) -> Result<Self, Error> {
         kernel.predict(self)
     }
 

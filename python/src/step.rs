@@ -126,8 +126,8 @@ impl<const D: usize> Built<D> {
     pub(crate) fn sensors(&self) -> Outcome<Vec<(f64, bool, bool)>> {
         let numbers = 0..self.seats.len() as u32;
         let of = |number| {
-            let centre = &self.centre;
-            Ok((centre.working(number)?, centre.is_named_dead(number)?, centre.is_excluded(number)?))
+            let state = self.centre.sensor(number)?;
+            Ok((state.working, state.declared_dead, state.excluded))
         };
         numbers.map(of).collect()
     }

@@ -6,7 +6,7 @@ use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Gaussian, Message, Ob
 use fewbits_filters::{Imm, ImmBelief, MomentFilter, StateFilter, Switching};
 use fewbits_models::{LinearGaussian, LinearSensor};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
-use fewbits_numerics::{normal, stored};
+use fewbits_numerics::{bisect, normal};
 use nalgebra::{Matrix2, Vector1, Vector2};
 use rand_pcg::Pcg64Mcg;
 use serde::{Deserialize, Serialize};
@@ -77,21 +77,51 @@ impl Message for Word {
     }
 }
 
-stored! { FixedRate as StoredFixedRate |rate| {
-    bits: u32 = rate.bits,
-    #[serde(with = "fewbits_numerics::stored")]
-    unit: f64 = rate.unit,
-    belief: ImmBelief<2> = rate.belief,
-    turn: usize = rate.turn,
-} => {
-    let rate = FixedRate::new(bits, unit, 0.0)?;
-    let models = rate.belief.modes().len();
-    if belief.modes().len() != models {
-        let expected = format!("{models}, one for each model");
-        return Err(ArgumentError::new("belief", format!("{} Gaussians", belief.modes().len()), expected).into());
+/// The stored form of [`FixedRate`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredFixedRate {
+    bits: u32,
+    unit: f64,
+    belief: ImmBelief<2>,
+    turn: usize,
+}
+
+impl From<FixedRate> for StoredFixedRate {
+    fn from(rate: FixedRate) -> Self {
+        Self {
+            bits: rate.bits,
+            unit: rate.unit,
+            belief: rate.belief,
+            turn: rate.turn,
+        }
     }
-    Ok(FixedRate { belief, turn: turn % TURNS, ..rate })
-}, Error }
+}
+
+impl TryFrom<StoredFixedRate> for FixedRate {
+    type Error = Error;
+
+    fn try_from(
+        StoredFixedRate {
+            bits,
+            unit,
+            belief,
+            turn,
+        }: StoredFixedRate,
+    ) -> Result<Self, Error> {
+        let rate = FixedRate::new(bits, unit, 0.0)?;
+        let models = rate.belief.modes().len();
+        if belief.modes().len() != models {
+            let expected = format!("{models}, one for each model");
+            return Err(ArgumentError::new("belief", format!("{} Gaussians", belief.modes().len()), expected).into());
+        }
+        Ok(FixedRate {
+            belief,
+            turn: turn % TURNS,
+            ..rate
+        })
+    }
+}
 
 impl FixedRate {
     /// Words of `bits` bits for a signal that starts at about `start` with uncertainty `unit`, and typically changes by up to a few
@@ -212,15 +242,7 @@ impl FixedRate {
                     f64::from(i) / f64::from(count)
                 };
                 // 50 halvings reach the rounding of the range.
-                let (mut low, mut high) = (low, high);
-                for _ in 0..50 {
-                    let middle = 0.5 * (low + high);
-                    if below(middle) < target {
-                        low = middle;
-                    } else {
-                        high = middle;
-                    }
-                }
+                let (low, high) = bisect::boundary(|x| below(x) < target, low, high, 50);
                 0.5 * (low + high)
             })
             .collect()

@@ -37,20 +37,55 @@ pub struct Receiver {
     synchronised: bool,
 }
 
-fewbits_numerics::stored! { #[serde(rename = "Receiver")] Receiver as Stored |receiver| {
-    config: Config = receiver.config,
-    replica: Option<Replica> = receiver.replica,
-    slot: Option<u64> = receiver.slot,
-    sequence: u32 = receiver.sequence,
-    synchronised: bool = receiver.synchronised,
-} => {
-    if replica.as_ref().is_some_and(|replica| !replica.is_valid(&config.0)) {
-        return Err(ArgumentError::new("replica", "inconsistent", "the state that was stored"));
+/// The stored form of [`Receiver`].
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "Receiver", deny_unknown_fields)]
+struct Stored {
+    config: Config,
+    replica: Option<Replica>,
+    slot: Option<u64>,
+    sequence: u32,
+    synchronised: bool,
+}
+
+impl From<Receiver> for Stored {
+    fn from(receiver: Receiver) -> Self {
+        Self {
+            config: receiver.config,
+            replica: receiver.replica,
+            slot: receiver.slot,
+            sequence: receiver.sequence,
+            synchronised: receiver.synchronised,
+        }
     }
-    let synchronised = synchronised && replica.is_some();
-    let sequence = sequence & ((1 << config.sequence_bits()) - 1);
-    Ok(Receiver { config, replica, slot, sequence, synchronised })
-}, ArgumentError }
+}
+
+impl TryFrom<Stored> for Receiver {
+    type Error = ArgumentError;
+
+    fn try_from(
+        Stored {
+            config,
+            replica,
+            slot,
+            sequence,
+            synchronised,
+        }: Stored,
+    ) -> Result<Self, ArgumentError> {
+        if replica.as_ref().is_some_and(|replica| !replica.is_valid(&config.0)) {
+            return Err(ArgumentError::new("replica", "inconsistent", "the state that was stored"));
+        }
+        let synchronised = synchronised && replica.is_some();
+        let sequence = sequence & ((1 << config.sequence_bits()) - 1);
+        Ok(Receiver {
+            config,
+            replica,
+            slot,
+            sequence,
+            synchronised,
+        })
+    }
+}
 
 impl Receiver {
     /// A receiver that runs from the sensor's first slot on.

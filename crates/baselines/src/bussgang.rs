@@ -1,7 +1,8 @@
 //! The Kalman filter of signs by Bussgang's decomposition.
 
 use fewbits_core::{Error, Gaussian};
-use fewbits_numerics::linalg::{congruence, definite_factor, solve_semidefinite, times_transposed};
+use fewbits_numerics::factored::Factored;
+use fewbits_numerics::linalg::{congruence, solve_semidefinite, symmetrised, times_transposed};
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::FRAC_2_PI;
 
@@ -25,7 +26,8 @@ pub fn update<const D: usize, const M: usize>(
     noise: &SMatrix<f64, M, M>,
     signs: &SVector<f64, M>,
 ) -> Result<Gaussian<D>, Error> {
-    let (spread, _) = definite_factor("innovation_covariance", &(congruence(matrix, belief.covariance()) + noise))?;
+    let spread = symmetrised(&(congruence(matrix, belief.covariance()) + noise));
+    Factored::new("innovation_covariance", &spread)?;
     let roots = spread.diagonal().map(f64::sqrt);
     let of_signs = SMatrix::<f64, M, M>::from_fn(|i, j| {
         let correlation = spread[(i, j)] / (roots[i] * roots[j]);

@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Numbers")]
 pub struct Budget {
-    #[serde(with = "fewbits_numerics::stored")]
     messages: f64,
     sensors: usize,
 }
@@ -19,7 +18,6 @@ pub struct Budget {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Numbers {
-    #[serde(with = "fewbits_numerics::stored")]
     messages: f64,
     sensors: usize,
 }

@@ -81,7 +81,7 @@ pub fn step<const D: usize, const M: usize>(
 ///
 /// # Errors
 /// As [`update`].
-pub fn evidence_through<const D: usize, const M: usize>(
+pub(crate) fn evidence_through<const D: usize, const M: usize>(
     belief: &Gaussian<D>,
     observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
 ) -> Result<(f64, SVector<f64, M>), Error> {
@@ -172,7 +172,7 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// not hold what the next reports leave of them. Without this the covariance would become indefinite, and the mean would be trusted beyond
 /// its own digits.
 #[inline]
-pub fn with_rounding<const D: usize>(
+pub(crate) fn with_rounding<const D: usize>(
     covariance: SMatrix<f64, D, D>,
     keep: &SMatrix<f64, D, D>,
     prior: &Gaussian<D>,

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 pub enum Noise {
     /// The same variance at every measurement.
-    Variance(#[serde(with = "fewbits_numerics::stored")] f64),
+    Variance(f64),
     /// A deviation that grows with the measurement.
     Range(RangeNoise),
 }

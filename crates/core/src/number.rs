@@ -4,7 +4,7 @@ use crate::bits::{BitReader, BitWriter, CodecError};
 use crate::cell::Cell;
 use crate::gaussian::Gaussian;
 use crate::message::Message;
-use fewbits_numerics::error::{ArgumentError, finite, within};
+use fewbits_numerics::error::{ArgumentError, all_finite, finite, within};
 use fewbits_numerics::linalg::triangular_factor;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
@@ -27,9 +27,7 @@ pub enum NumberFormat {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Numbers")]
 pub struct Levels {
-    #[serde(with = "fewbits_numerics::stored")]
     lower: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     upper: f64,
     bits: u32,
 }
@@ -38,9 +36,7 @@ pub struct Levels {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Numbers {
-    #[serde(with = "fewbits_numerics::stored")]
     lower: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     upper: f64,
     bits: u32,
 }
@@ -209,37 +205,31 @@ impl<const M: usize> Message for SVector<f64, M> {
     }
 }
 
-/// The mean, and the lower triangle of the covariance row by row: `D + D (D + 1)/2` numbers. In [`NumberFormat::Double`] every Gaussian
-/// arrives as it is. In a shorter format the entries must be numbers of the format and together a covariance; [`RoundedGaussian`]
-/// rounds any Gaussian.
+/// Mean and covariance as a [`RoundedGaussian`], which must be this Gaussian: in [`NumberFormat::Double`] every Gaussian arrives as it is.
+/// [`RoundedGaussian::new`] rounds a Gaussian to a shorter format.
 impl<const D: usize> Message for Gaussian<D> {
     type Format = NumberFormat;
 
     fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
-        self.mean().encode(format, writer)?;
-        (0..D).try_for_each(|i| (0..=i).try_for_each(|j| format.write(self.covariance()[(i, j)], writer)))
+        match RoundedGaussian::new(self, format) {
+            Ok(rounded) if rounded.belief() == *self => rounded.encode(format, writer),
+            _ => Err(CodecError::invalid("belief", format!("{self:?}"), "a Gaussian that the format holds exactly")),
+        }
     }
 
     fn decode(format: &NumberFormat, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
-        let mean = SVector::decode(format, reader)?;
-        let mut covariance = SMatrix::<f64, D, D>::zeros();
-        for i in 0..D {
-            for j in 0..=i {
-                covariance[(i, j)] = format.read(reader)?;
-                covariance[(j, i)] = covariance[(i, j)];
-            }
-        }
-        Self::new(mean, covariance)
-            .map_err(|error| CodecError::invalid("covariance", error.value, "a positive semidefinite matrix"))
+        RoundedGaussian::decode(format, reader).map(|rounded| rounded.belief())
     }
 }
 
-/// A Gaussian as it arrives in a number format: mean and lower triangular factor of the covariance, `D + D (D + 1)/2` numbers. A product
-/// of factors is positive semidefinite however they were rounded.
+/// A Gaussian as it arrives in a number format: the mean and a lower triangle row by row, `D + D (D + 1)/2` numbers. The triangle is that of
+/// the covariance in [`NumberFormat::Double`]. In a shorter format it is the triangular factor of the covariance: a product of factors is
+/// positive semidefinite however they were rounded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RoundedGaussian<const D: usize> {
     mean: SVector<f64, D>,
-    lower: SMatrix<f64, D, D>,
+    triangle: SMatrix<f64, D, D>,
+    covariance: SMatrix<f64, D, D>,
 }
 
 impl<const D: usize> RoundedGaussian<D> {
@@ -248,27 +238,51 @@ impl<const D: usize> RoundedGaussian<D> {
     /// # Errors
     /// If a number is not finite or exceeds the format.
     pub fn new(belief: &Gaussian<D>, format: &NumberFormat) -> Result<Self, ArgumentError> {
-        let mut rounded = Self {
-            mean: *belief.mean(),
-            lower: triangular_factor(belief.covariance()),
+        Self::with_factor(belief, triangular_factor(belief.covariance()), format)
+    }
+
+    /// The same from a belief whose lower triangular factor is known.
+    ///
+    /// # Errors
+    /// If a number is not finite or exceeds the format.
+    pub fn with_factor(
+        belief: &Gaussian<D>,
+        lower: SMatrix<f64, D, D>,
+        format: &NumberFormat,
+    ) -> Result<Self, ArgumentError> {
+        let mut mean = *belief.mean();
+        let mut triangle = match format {
+            NumberFormat::Double => belief.covariance().lower_triangle(),
+            _ => lower.lower_triangle(),
         };
-        for x in rounded.mean.iter_mut() {
+        for x in mean.iter_mut() {
             *x = format.rounded(*x)?;
         }
-        for at in Self::triangle() {
-            rounded.lower[at] = format.rounded(rounded.lower[at])?;
+        for at in triangle_of::<D>() {
+            triangle[at] = format.rounded(triangle[at])?;
         }
-        Ok(rounded)
+        Ok(Self {
+            mean,
+            triangle,
+            covariance: covariance_of(&triangle, format),
+        })
     }
 
     /// The belief that sender and receiver hold afterwards.
     pub fn belief(&self) -> Gaussian<D> {
-        Gaussian::from_trusted_parts(self.mean, self.lower * self.lower.transpose())
+        Gaussian::from_trusted_parts(self.mean, self.covariance)
     }
+}
 
-    /// Row and column of each entry of the lower triangle.
-    fn triangle() -> impl Iterator<Item = (usize, usize)> {
-        (0..D).flat_map(|i| (0..=i).map(move |j| (i, j)))
+/// Row and column of each entry of the lower triangle.
+fn triangle_of<const D: usize>() -> impl Iterator<Item = (usize, usize)> {
+    (0..D).flat_map(|i| (0..=i).map(move |j| (i, j)))
+}
+
+fn covariance_of<const D: usize>(triangle: &SMatrix<f64, D, D>, format: &NumberFormat) -> SMatrix<f64, D, D> {
+    match format {
+        NumberFormat::Double => SMatrix::from_fn(|i, j| triangle[(i.max(j), i.min(j))]),
+        _ => triangle * triangle.transpose(),
     }
 }
 
@@ -277,25 +291,41 @@ impl<const D: usize> Message for RoundedGaussian<D> {
 
     fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
         self.mean.encode(format, writer)?;
-        Self::triangle().try_for_each(|at| format.write(self.lower[at], writer))
+        triangle_of::<D>().try_for_each(|at| format.write(self.triangle[at], writer))
     }
 
     fn decode(format: &NumberFormat, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
-        let (mean, mut lower) = (SVector::decode(format, reader)?, SMatrix::zeros());
-        for at in Self::triangle() {
-            lower[at] = format.read(reader)?;
+        let mean = SVector::<f64, D>::decode(format, reader)?;
+        let mut triangle = SMatrix::<f64, D, D>::zeros();
+        for at in triangle_of::<D>() {
+            triangle[at] = format.read(reader)?;
         }
-        Ok(Self { mean, lower })
+        let covariance: SMatrix<f64, D, D> = covariance_of(&triangle, format);
+        let checked = match format {
+            // The entries of a covariance need not be those of any.
+            NumberFormat::Double => Gaussian::new(mean, covariance),
+            _ => {
+                all_finite("covariance", covariance.as_slice()).map(|_| Gaussian::from_trusted_parts(mean, covariance))
+            }
+        };
+        let belief = checked
+            .map_err(|error| CodecError::invalid("covariance", error.value, "a finite positive semidefinite matrix"))?;
+        Ok(Self {
+            mean,
+            triangle,
+            covariance: *belief.covariance(),
+        })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::{Levels, NumberFormat, RoundedGaussian};
+    use crate::bits::BitString;
     use crate::gaussian::Gaussian;
     use crate::laws::message::{decoding_is_total, round_trip};
     use crate::message::Message;
-    use nalgebra::{Matrix4, Vector2, Vector4};
+    use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
     #[test]
     fn what_a_format_holds_comes_back_to_the_last_bit() {
@@ -305,6 +335,21 @@ mod tests {
             assert_eq!(round_trip(&value, &format).unwrap(), bits);
         }
         assert!(fixed.rounded(f64::NAN).is_err() && NumberFormat::Single.rounded(1e300).is_err());
+    }
+
+    /// In double precision the numbers of every Gaussian arrive, thin ones too; in shorter formats only those that the format holds.
+    #[test]
+    fn a_gaussian_arrives_as_it_is_or_is_refused() {
+        let thin = Vector4::new(1.0, 1.0 / 3.0, -0.7, 0.0);
+        let belief = Gaussian::new(thin, thin * thin.transpose()).unwrap();
+        assert_eq!(round_trip(&belief, &NumberFormat::Double), Ok(14 * 64));
+        assert!(belief.to_bits(&NumberFormat::Single).is_err());
+        let whole = Gaussian::new(Vector2::new(1.0, 2.0), Matrix2::new(4.0, 2.0, 2.0, 10.0)).unwrap();
+        assert_eq!(round_trip(&whole, &NumberFormat::Single), Ok(5 * 32));
+        // Entries that are no covariance are refused.
+        let bits = Vector4::new(0.0, 0.0, 1.0, 3.0).to_bits(&NumberFormat::Double).unwrap();
+        let bits = BitString::from_bytes([bits.bytes(), &1.0_f64.to_be_bytes()].concat(), 320).unwrap();
+        assert!(Gaussian::<2>::from_bits(&NumberFormat::Double, &bits).is_err());
     }
 
     #[test]

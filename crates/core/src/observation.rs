@@ -72,11 +72,8 @@ impl<R> From<Option<R>> for Observation<R> {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(try_from = "Numbers")]
 pub struct Link {
-    #[serde(with = "fewbits_numerics::stored")]
     loss: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     erasure: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     crossover: f64,
 }
 
@@ -84,11 +81,9 @@ pub struct Link {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Numbers {
-    #[serde(with = "fewbits_numerics::stored")]
     loss: f64,
-    #[serde(default, with = "fewbits_numerics::stored")]
+    #[serde(default)]
     erasure: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     crossover: f64,
 }
 
@@ -217,7 +212,7 @@ impl Link {
     ///
     /// # Errors
     /// [`Error::Impossible`] if nothing arrives over this link.
-    pub fn received_given_words(
+    pub(crate) fn received_given_words(
         &self,
         sent: impl Iterator<Item = u64>,
         received: u64,

@@ -3,7 +3,7 @@
 pub use crate::added_density::{AddedDensity, SliceMoments};
 
 use crate::belief::Travelling;
-use crate::packed::PackedBelief;
+use crate::packed::AddedNumbers;
 use crate::posterior::Posterior;
 use crate::rate::RateModel;
 use crate::record::Record;
@@ -56,8 +56,8 @@ pub trait AddedForm: Debug + Send + Sync {
     ///
     /// # Errors
     /// If the numbers are no belief of this form.
-    fn read(&self, _packed: &PackedBelief, code: usize) -> Result<Travelling, Error> {
-        refuse("message", format!("code {code}"), "a mixture")
+    fn read(&self, numbers: &AddedNumbers) -> Result<Travelling, Error> {
+        refuse("message", format!("code {}", numbers.code), "a mixture")
     }
 }
 

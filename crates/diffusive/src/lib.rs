@@ -105,6 +105,5 @@ pub use walk::SourceChain;
 #[doc(hidden)]
 pub mod engine {
     pub use crate::form::{check_components, gaussian_scalars};
-    pub use crate::message::{push_gaussian, read_gaussian};
     pub use crate::search_box::bounds;
 }

@@ -1,17 +1,16 @@
 //! Messages between nodes: raw records or a belief, as bits.
 
-pub use crate::packed::PackedBelief;
+pub use crate::packed::{AddedNumbers, Content, PackedBelief};
 
 use crate::belief::{SentBelief, Travelling};
 use crate::fit::Fit;
-use crate::form::{COUNT_BITS, Form, MAX_COUNT, gaussian_scalars};
+use crate::form::{COUNT_BITS, Form, MAX_COUNT};
 use crate::record::Record;
 use crate::sensor::SourceSensor;
 use fewbits_core::{BitReader, BitWriter, CodecError, Error, Message, NumberFormat};
-use fewbits_densities::{Component, Mixture};
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, entries, non_negative, refuse, within};
-use nalgebra::{SMatrix, SVector, Vector2};
+use fewbits_mixture_codec::wire::RoundedMixture;
+use fewbits_numerics::error::{all_finite, non_negative, refuse, within};
+use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
 /// Code of a sample: evenly spaced levels, `step` noise standard deviations apart.
@@ -143,18 +142,19 @@ impl Packet {
     /// # Errors
     /// If a number does not fit the format.
     pub fn belief_of(belief: &Travelling, fit: &Fit, wire: &Wire) -> Result<Self, Error> {
-        let round = |numbers: Vec<f64>| -> Result<Vec<f64>, ArgumentError> {
-            numbers.into_iter().map(|x| wire.numbers.rounded(x)).collect()
-        };
-        let (components, code, numbers) = match belief {
-            Travelling::Position(belief) => numbers_of(belief),
-            Travelling::WithRate(belief) => numbers_of(belief),
+        let numbers = &wire.numbers;
+        let content = match belief {
+            Travelling::Position(SentBelief::Mixture(mixture)) => {
+                Content::Position(RoundedMixture::new(mixture, numbers)?)
+            }
+            Travelling::WithRate(SentBelief::Mixture(mixture)) => {
+                Content::WithRate(RoundedMixture::new(mixture, numbers)?)
+            }
+            Travelling::Position(SentBelief::Other(density)) => added(density.numbers(), false, numbers)?,
+            Travelling::WithRate(SentBelief::Other(density)) => added(density.numbers(), true, numbers)?,
         };
         Ok(Self::Belief(PackedBelief {
-            components,
-            code,
-            with_rate: matches!(belief, Travelling::WithRate(_)),
-            numbers: round(numbers)?,
+            content,
             // A sum beyond single precision is sent as the largest number: both lead to refusal.
             chi_squared: NumberFormat::Single.rounded(fit.chi_squared.min(f64::from(f32::MAX)))?,
             samples: fit.samples.min((1 << SAMPLE_COUNT_BITS) - 1),
@@ -167,11 +167,11 @@ impl Packet {
     /// If the numbers are not a valid belief of this form.
     pub fn belief(&self, form: Form) -> Result<Option<(Travelling, Fit)>, Error> {
         let Self::Belief(packed) = self else { return Ok(None) };
-        let belief = match (packed.code, form) {
-            (Some(code), Form::Other(form)) => form.0.read(packed, code)?,
-            (Some(code), _) => return refuse("message", format!("code {code}"), "a mixture"),
-            (None, _) if packed.with_rate => Travelling::WithRate(SentBelief::Mixture(mixture_of(packed)?)),
-            (None, _) => Travelling::Position(SentBelief::Mixture(mixture_of(packed)?)),
+        let belief = match (&packed.content, form) {
+            (Content::Position(mixture), _) => Travelling::Position(SentBelief::Mixture(mixture.mixture()?)),
+            (Content::WithRate(mixture), _) => Travelling::WithRate(SentBelief::Mixture(mixture.mixture()?)),
+            (Content::Added(numbers), Form::Other(form)) => form.0.read(numbers)?,
+            (Content::Added(numbers), _) => return refuse("message", format!("code {}", numbers.code), "a mixture"),
         };
         let fit = Fit {
             chi_squared: non_negative("chi_squared", packed.chi_squared)?,
@@ -215,12 +215,7 @@ impl Message for Packet {
             }
             Self::Belief(belief) => {
                 writer.write_bit(true);
-                writer.write(belief.components as u64, COUNT_BITS)?;
-                writer.write(belief.code.unwrap_or(MAX_COUNT) as u64, COUNT_BITS)?;
-                writer.write_bit(belief.with_rate);
-                for number in &belief.numbers {
-                    format.wire.numbers.write(*number, writer)?;
-                }
+                encode_content(&belief.content, &format.wire.numbers, writer)?;
                 NumberFormat::Single.write(belief.chi_squared, writer)?;
                 writer.write(belief.samples as u64, SAMPLE_COUNT_BITS)?;
             }
@@ -242,23 +237,8 @@ impl Message for Packet {
             }
             return Ok(Self::Raw(records));
         }
-        let components = reader.read(COUNT_BITS)? as usize;
-        let code = Some(reader.read(COUNT_BITS)? as usize).filter(|code| *code != MAX_COUNT);
-        let with_rate = reader.read_bit()?;
-        let count = match (code, format.form) {
-            (Some(code), Form::Other(form)) => form.0.numbers(components, code, with_rate),
-            (Some(code), _) => return Err(CodecError::invalid("code", code, "31, a mixture")),
-            // The first weight is not sent: they sum to one.
-            (None, _) => (components * (1 + gaussian_scalars(with_rate))).saturating_sub(1),
-        };
-        let numbers = (0..count)
-            .map(|_| format.wire.numbers.read(reader))
-            .collect::<Result<_, _>>()?;
         Ok(Self::Belief(PackedBelief {
-            components,
-            code,
-            with_rate,
-            numbers,
+            content: decode_content(format, reader)?,
             chi_squared: NumberFormat::Single.read(reader)?,
             samples: reader.read(SAMPLE_COUNT_BITS)? as usize,
         }))
@@ -273,52 +253,55 @@ fn invalid(error: Error) -> CodecError {
     }
 }
 
-/// Number of components, code and numbers of a belief.
-fn numbers_of<const D: usize>(belief: &SentBelief<D>) -> (usize, Option<usize>, Vec<f64>) {
-    let mut numbers = Vec::new();
-    match belief {
-        SentBelief::Mixture(mixture) => {
-            numbers.extend(mixture.components().iter().skip(1).map(Component::weight));
-            mixture.components().iter().for_each(|c| push_gaussian(c, &mut numbers));
-            (mixture.len(), None, numbers)
+/// The numbers of an added form as they arrive.
+fn added(
+    (components, code, numbers): (usize, usize, Vec<f64>),
+    with_rate: bool,
+    format: &NumberFormat,
+) -> Result<Content, Error> {
+    let numbers = numbers.into_iter().map(|x| format.rounded(x));
+    Ok(Content::Added(AddedNumbers {
+        components,
+        code,
+        with_rate,
+        numbers: numbers.collect::<Result<_, _>>()?,
+    }))
+}
+
+fn encode_content(content: &Content, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
+    let (components, code, with_rate) = match content {
+        Content::Position(mixture) => (mixture.components(), MAX_COUNT, false),
+        Content::WithRate(mixture) => (mixture.components(), MAX_COUNT, true),
+        Content::Added(added) => (added.components, added.code, added.with_rate),
+    };
+    writer.write(components as u64, COUNT_BITS)?;
+    writer.write(code as u64, COUNT_BITS)?;
+    writer.write_bit(with_rate);
+    match content {
+        Content::Position(mixture) => mixture.encode(&(components, *format), writer),
+        Content::WithRate(mixture) => mixture.encode(&(components, *format), writer),
+        Content::Added(added) => added.numbers.iter().try_for_each(|x| format.write(*x, writer)),
+    }
+}
+
+fn decode_content(format: &Contract, reader: &mut BitReader<'_>) -> Result<Content, CodecError> {
+    let components = reader.read(COUNT_BITS)? as usize;
+    let code = reader.read(COUNT_BITS)? as usize;
+    let with_rate = reader.read_bit()?;
+    let numbers = format.wire.numbers;
+    match (code, format.form) {
+        (MAX_COUNT, _) if with_rate => RoundedMixture::decode(&(components, numbers), reader).map(Content::WithRate),
+        (MAX_COUNT, _) => RoundedMixture::decode(&(components, numbers), reader).map(Content::Position),
+        (code, Form::Other(form)) => {
+            let count = form.0.numbers(components, code, with_rate);
+            let numbers = (0..count).map(|_| numbers.read(reader));
+            Ok(Content::Added(AddedNumbers {
+                components,
+                code,
+                with_rate,
+                numbers: numbers.collect::<Result<_, _>>()?,
+            }))
         }
-        SentBelief::Other(density) => {
-            let (components, code, numbers) = density.numbers();
-            (components, Some(code), numbers)
-        }
+        (code, _) => Err(CodecError::invalid("code", code, "31, a mixture")),
     }
-}
-
-fn mixture_of<const D: usize>(packed: &PackedBelief) -> Result<Mixture<D>, Error> {
-    let (count, numbers) = (packed.components, &packed.numbers);
-    let (weights, gaussians) = numbers.split_at(count.saturating_sub(1).min(numbers.len()));
-    let first = (1.0 - weights.iter().sum::<f64>()).max(0.0);
-    let weights = std::iter::once(first).chain(weights.iter().copied());
-    let gaussians = gaussians.chunks(gaussian_scalars(D == 3)).zip(weights);
-    let components = gaussians.map(|(chunk, weight)| read_gaussian(weight, chunk));
-    Mixture::new(components.collect::<Result<_, _>>()?)
-}
-
-/// Appends the numbers of a Gaussian: its mean and its lower Cholesky factor, row by row.
-pub fn push_gaussian<const D: usize>(c: &Component<D>, numbers: &mut Vec<f64>) {
-    numbers.extend(c.mean().iter());
-    for i in 0..D {
-        numbers.extend((0..=i).map(|j| c.factor().lower[(i, j)]));
-    }
-}
-
-/// The Gaussian of these numbers.
-///
-/// # Errors
-/// If the numbers are too many or few, or no Gaussian.
-pub fn read_gaussian<const D: usize>(weight: f64, numbers: &[f64]) -> Result<Component<D>, Error> {
-    entries("numbers", numbers.len(), gaussian_scalars(D == 3))?;
-    let (mean, mut rest) = numbers.split_at(D);
-    let mut lower = SMatrix::<f64, D, D>::zeros();
-    for i in 0..D {
-        let (row, others) = rest.split_at(i + 1);
-        (0..=i).for_each(|j| lower[(i, j)] = row[j]);
-        rest = others;
-    }
-    Component::new(weight, SVector::from_column_slice(mean), lower * lower.transpose())
 }

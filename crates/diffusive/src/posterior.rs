@@ -101,7 +101,7 @@ impl Posterior {
     }
 
     /// Share of the mass within one cell or two standard deviations of the border of the search box. It is large if the source is outside.
-    pub fn mass_at_border(&self, search: &SearchBox) -> f64 {
+    pub(crate) fn mass_at_border(&self, search: &SearchBox) -> f64 {
         let [x, y] = self.cells.columns();
         let edge = self
             .cells

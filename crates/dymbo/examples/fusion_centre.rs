@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         events.extend(centre.receive(&mut rng, &slots)?.events);
     }
-    println!("noticed {events:?}; the first sensor works with probability {:.1e}", centre.working(0)?);
+    println!("noticed {events:?}; the first sensor works with probability {:.1e}", centre.sensor(0)?.working);
     println!("error {:.2} m", (centre.estimate().mean() - truth).norm());
     Ok(())
 }

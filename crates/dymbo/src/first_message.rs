@@ -47,9 +47,7 @@ impl Message for Multiple {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Numbers")]
 pub struct RoundedSample {
-    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     resolution: f64,
     bits: u32,
 }
@@ -58,9 +56,7 @@ pub struct RoundedSample {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Numbers {
-    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     resolution: f64,
     bits: u32,
 }

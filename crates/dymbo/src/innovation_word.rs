@@ -12,10 +12,8 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Prediction {
     /// Predicted measurement.
-    #[serde(with = "fewbits_numerics::stored")]
     pub mean: f64,
     /// Standard deviation of the innovation, `sqrt(P + sigma^2)`.
-    #[serde(with = "fewbits_numerics::stored")]
     pub deviation: f64,
 }
 
@@ -82,7 +80,6 @@ pub struct InnovationWord {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Numbers {
-    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64,
     bits: u32,
 }

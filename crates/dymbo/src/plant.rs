@@ -24,11 +24,8 @@ pub struct ScalarPlant {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Numbers {
-    #[serde(with = "fewbits_numerics::stored")]
     coefficient: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     process_variance: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     measurement_variance: f64,
 }
 

@@ -28,7 +28,6 @@ use std::f64::consts::FRAC_2_PI;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Numbers")]
 pub struct SignBit {
-    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64,
 }
 
@@ -36,7 +35,6 @@ pub struct SignBit {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Numbers {
-    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64,
 }
 

@@ -13,7 +13,6 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored<D>")]
 pub struct ImmBelief<const D: usize> {
-    #[serde(with = "fewbits_numerics::stored")]
     pub(crate) probabilities: Vec<f64>,
     pub(crate) modes: Vec<Gaussian<D>>,
 }
@@ -23,7 +22,6 @@ pub struct ImmBelief<const D: usize> {
 #[serde(rename = "ImmBelief")]
 #[serde(deny_unknown_fields)]
 struct Stored<const D: usize> {
-    #[serde(with = "fewbits_numerics::stored")]
     probabilities: Vec<f64>,
     modes: Vec<Gaussian<D>>,
 }

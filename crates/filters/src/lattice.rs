@@ -18,24 +18,24 @@ const REACH: f64 = 8.6;
 /// A step takes time in proportion to the nodes times the nodes that one of them reaches.
 ///
 /// ```
-/// use fewbits_filters::{Lattice, LatticeFilter, UniformGrid};
+/// use fewbits_filters::{Lattice, LatticeKernel, UniformGrid};
 /// let axes = vec![UniformGrid::new(-12.0, 12.0, 0.25)?; 2];
 /// let start = Lattice::normal(axes, &[1.0, 0.0], &[1.0, 0.5])?;
 /// let (x, y) = (start.positions(0), start.positions(1));
 /// let mean = [x.iter().zip(&y).map(|(x, y)| x + y).collect(), y.clone()];       // place and speed
 /// let deviation = [vec![0.5; x.len()], vec![0.3; x.len()]];
-/// let next = LatticeFilter::new(mean, deviation, &start)?.predict(&start)?;
+/// let next = LatticeKernel::new(mean, deviation, &start)?.predict(&start)?;
 /// let [(place, variance), _] = next.moments()[..] else { panic!() };
 /// assert!((place - 1.0).abs() < 1e-9 && (variance - (1.0 + 0.25 + 0.25)).abs() < 1e-9);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct LatticeFilter {
+pub struct LatticeKernel {
     means: Vec<Vec<f64>>,
     deviations: Vec<Vec<f64>>,
 }
 
-impl LatticeFilter {
+impl LatticeKernel {
     /// The dynamics by the mean and the deviation of the next state from every node: one vector per axis, in the order of the nodes.
     ///
     /// # Errors

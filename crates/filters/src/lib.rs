@@ -14,7 +14,7 @@
 //! | linear Gaussian state, any factor of scalars | [`RaoBlackwellised`] (measurements imputed, states exact) | [`impute`] |
 //! | several models, one at a time | [`Imm`] (interacting multiple models) | [`Switching`] (their dynamics) |
 //! | the exact answer for a scalar | [`PointMassFilter`] (any dynamics, fixed grid), [`MovingGridFilter`] (linear dynamics) | [`TransitionKernel`] (its time update) |
-//! | the exact answer for a few numbers | | [`LatticeFilter`] (independent noise on each) |
+//! | the exact answer for a few numbers | | [`LatticeKernel`] (independent noise on each) |
 //! | smoothing | | [`smoother`] (Gaussian beliefs: Rauch-Tung-Striebel), [`backward_simulation`] (particles), [`TransitionKernel::smooth`] (a grid) |
 //! | calibration of sensors and level from recorded readings | [`fit`] (maximum likelihood), [`calibration`] (noises and change alone) | |
 //! | the steady state | [`scalar_steady_state`] (closed form, any message quality), [`steady_state`] (doubling) | |
@@ -71,7 +71,7 @@ pub use grid_filter::GridFilter;
 pub use guided::{GuidedFilter, GuidedParticles};
 pub use imm::Imm;
 pub use imm_belief::ImmBelief;
-pub use lattice::LatticeFilter;
+pub use lattice::LatticeKernel;
 pub use moving_grid::{MovingGrid, MovingGridFilter};
 pub use particle::BootstrapFilter;
 pub use point_mass::PointMassFilter;

@@ -96,10 +96,11 @@ where
 
     fn health(&self) -> Vec<SensorHealth> {
         let judged = self.numbers.iter().map(|number| {
+            let state = self.centre.sensor(*number).ok()?;
             Some(SensorHealth {
-                working: self.centre.working(*number).ok()?,
-                dead: self.centre.is_named_dead(*number).ok()?,
-                excluded: self.centre.is_excluded(*number).ok()?,
+                working: state.working,
+                dead: state.declared_dead,
+                excluded: state.excluded,
             })
         });
         // All numbers are those of sensors that have joined.
@@ -145,8 +146,7 @@ where
                 let origin = Some(u64::from_be_bytes(*origin)).filter(|origin| *origin != u64::MAX);
                 (origin, u64::from_be_bytes(*slot), CentreState::<F::Belief>::from_bytes(rest)?)
             }
-            // As earlier programs wrote it.
-            json => serde_json::from_slice(json)?,
+            _ => return Err("a state of another version".into()),
         };
         self.centre.restore(state)?;
         (self.origin, self.slot) = (origin, slot);

@@ -9,6 +9,7 @@
 //! | few Gaussians for an estimate | [`Reduction`]; [`Reduction::default`] is the recommended method |
 //! | few Gaussians for weighted points or cells | [`Clumps`], [`MixtureFit`] |
 //! | the message, as bits | [`wire::CodedMixture`] under a [`wire::WireFormat`] that both ends know |
+//! | the message as numbers in double, single or fixed precision | [`wire::RoundedMixture`] |
 //! | the best message within a number of bits | [`wire::RateControl`] |
 //! | the difference between two densities, estimated at points | [`plug_in`] |
 //! | the same integrated over all of space, in one to three dimensions | [`quadrature`] |

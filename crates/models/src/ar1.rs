@@ -21,9 +21,7 @@ pub struct Ar1 {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Parameters {
-    #[serde(with = "fewbits_numerics::stored")]
     coefficient: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64,
 }
 

@@ -5,7 +5,8 @@
 use crate::Error;
 use fewbits_core::{Dynamics, GaussianDynamics, Sensing};
 use fewbits_numerics::error::{at_least_one, positive};
-use fewbits_numerics::linalg::{definite_factor, semidefinite_factor};
+use fewbits_numerics::factored::Factored;
+use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
 use nalgebra::{SMatrix, SVector};
 use num_dual::Dual64;
 pub use num_dual::DualNum;
@@ -128,10 +129,10 @@ impl<F, const M: usize> AutoSensing<F, M> {
     /// # Errors
     /// If `R` is not finite, symmetric and positive definite.
     pub fn new(function: F, noise_covariance: SMatrix<f64, M, M>) -> Result<Self, Error> {
-        let (noise_covariance, noise_factor) = definite_factor("noise_covariance", &noise_covariance)?;
+        let noise_factor = Factored::new("noise_covariance", &noise_covariance)?.lower;
         Ok(Self {
             function,
-            noise_covariance,
+            noise_covariance: symmetrised(&noise_covariance),
             noise_factor,
         })
     }

@@ -4,7 +4,8 @@ use crate::Error;
 use fewbits_core::columns::measurements_agree;
 use fewbits_core::{Columns, ColumnsMut, LinearSensing, Sensing};
 use fewbits_numerics::error::{all_finite, positive};
-use fewbits_numerics::linalg::definite_factor;
+use fewbits_numerics::factored::Factored;
+use fewbits_numerics::linalg::symmetrised;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -57,10 +58,10 @@ impl<const D: usize, const M: usize> LinearSensor<D, M> {
     /// If an entry is not finite, or the covariance is not symmetric (relative to the deviations of row and column) positive definite.
     pub fn new(matrix: SMatrix<f64, M, D>, noise_covariance: SMatrix<f64, M, M>) -> Result<Self, Error> {
         all_finite("matrix", matrix.as_slice())?;
-        let (noise_covariance, noise_factor) = definite_factor("noise_covariance", &noise_covariance)?;
+        let noise_factor = Factored::new("noise_covariance", &noise_covariance)?.lower;
         Ok(Self {
             matrix,
-            noise_covariance,
+            noise_covariance: symmetrised(&noise_covariance),
             noise_factor,
         })
     }

@@ -33,13 +33,9 @@ struct Parameters<const D: usize> {
     #[serde(with = "fewbits_numerics::stored")]
     position: Vector2<f64>,
     axes: [usize; 2],
-    #[serde(with = "fewbits_numerics::stored")]
     power: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     attenuation: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     exponent: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64,
 }
 

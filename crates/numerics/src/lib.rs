@@ -10,7 +10,7 @@
 //! | [`roots`], [`newton`] | roots inside a bracket, without and with a derivative |
 //! | [`bisect`], [`golden`] | the place where a condition changes; the maximum of a function with one peak |
 //! | [`binomial`], [`LogSum`] | binomial coefficients, sums of exponentials that arrive one by one |
-//! | [`stored!`] | serde forms for types whose constructors check their arguments |
+//! | [`mod@stored`] | serde forms of matrices and of numbers that may be infinite |
 //! | [`wild`] | extreme numbers for tests: NaN, infinities, the ends of the range |
 //! | [`error`] | the argument error all constructors share, and the checks that raise it |
 //!

@@ -1,4 +1,4 @@
-//! Gauss-Legendre quadrature rules, computed once per process.
+//! Gauss-Legendre quadrature rules, computed once per process, and an adaptive rule.
 
 use gauss_quad::GaussLegendre;
 use std::num::NonZeroUsize;
@@ -71,4 +71,45 @@ pub fn gauss_legendre<const N: usize>() -> &'static Rule {
     const { assert!(N >= 1 && N <= CACHED) };
     static RULES: [OnceLock<Rule>; CACHED + 1] = [const { OnceLock::new() }; CACHED + 1];
     RULES[N].get_or_init(|| Rule::gauss_legendre(N))
+}
+
+/// When [`by_halves`] stops.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stop {
+    /// A panel is kept if its sum and the sum of its halves differ by at most this.
+    pub tolerance: f64,
+    /// Largest number of times that a panel is halved.
+    pub halvings: u32,
+}
+
+/// Integrates over `[a, b]` by a rule `sum(from, to)`, in panels that are halved until the sum over a panel agrees with the sums over its
+/// halves; `whole` is `sum(a, b)`. `kept` is called with each half that was kept, from left to right. A panel whose sum is NaN is not
+/// halved.
+///
+/// The difference is far above the error of the two halves, which are kept.
+///
+/// ```
+/// use fewbits_numerics::quadrature::{Stop, by_halves, gauss_legendre};
+/// let sum = |a: f64, b: f64| gauss_legendre::<8>().sum(a, b, f64::sqrt);
+/// let stop = Stop { tolerance: 1e-12, halvings: 40 };
+/// let integral = by_halves([0.0, 1.0], sum(0.0, 1.0), stop, &sum, &mut |_, _| {});
+/// assert!((integral - 2.0 / 3.0).abs() < 1e-12);
+/// ```
+pub fn by_halves(
+    [a, b]: [f64; 2],
+    whole: f64,
+    stop: Stop,
+    sum: &impl Fn(f64, f64) -> f64,
+    kept: &mut impl FnMut(f64, f64),
+) -> f64 {
+    let middle = 0.5 * (a + b);
+    let (left, right) = (sum(a, middle), sum(middle, b));
+    let apart = (left + right - whole).abs();
+    let Some(halvings) = stop.halvings.checked_sub(1).filter(|_| apart > stop.tolerance) else {
+        kept(a, middle);
+        kept(middle, b);
+        return left + right;
+    };
+    let stop = Stop { halvings, ..stop };
+    by_halves([a, middle], left, stop, sum, kept) + by_halves([middle, b], right, stop, sum, kept)
 }

@@ -1,21 +1,21 @@
-//! Serialised forms of types whose constructors check their arguments, and floats that are stored exactly in every format.
+//! Serialised forms of matrices, and of numbers that may be infinite.
 //!
-//! Some text formats print a float exactly but read it back with an error of one unit in the last place. Put
-//! `#[serde(with = "fewbits_numerics::stored")]` on a field of type `f64` or `f32`, a matrix, or an `Option`, `Vec`, array or pair of
-//! [`Floats`]. In text formats each float is then written as a string, the shortest that reads back exactly (`"0.1"`); binary formats
-//! store the float as usual. Plain numbers in text are accepted too.
+//! A float is stored by serde as any other number. Two kinds need `#[serde(with = "fewbits_numerics::stored")]` on their field: matrices,
+//! for which nalgebra is built without serde, and numbers that may be infinite, which JSON does not have. Text formats hold an infinity or
+//! NaN as text (`"inf"`, `"-inf"`, `"NaN"`), binary formats as the number it is.
+//!
+//! A JSON reader returns every bit of a number only if it rounds correctly: `serde_json` needs its feature `float_roundtrip`.
 //!
 //! ```
 //! #[derive(Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-//! struct Belief {
+//! struct Interval {
 //!     #[serde(with = "fewbits_numerics::stored")]
-//!     weights: [f64; 2],
+//!     ends: [f64; 2],
 //! }
-//! let belief = Belief { weights: [0.1, 1.0 / 3.0] };
-//! let text = serde_json::to_string(&belief).unwrap();
-//! assert_eq!(text, r#"{"weights":["0.1","0.3333333333333333"]}"#);
-//! assert_eq!(serde_json::from_str::<Belief>(&text).unwrap(), belief);
-//! assert_eq!(serde_json::from_str::<Belief>(r#"{"weights":[0.5, 1]}"#).unwrap(), Belief { weights: [0.5, 1.0] });
+//! let interval = Interval { ends: [1.0 / 3.0, f64::INFINITY] };
+//! let text = serde_json::to_string(&interval).unwrap();
+//! assert_eq!(text, r#"{"ends":[0.3333333333333333,"inf"]}"#);
+//! assert_eq!(serde_json::from_str::<Interval>(&text).unwrap(), interval);
 //! ```
 
 use nalgebra::SMatrix;
@@ -23,14 +23,14 @@ use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt::{Formatter, Result as Written};
 
-/// One float: text in text formats, eight bytes in binary ones.
+/// One float: the text of an infinity or NaN in text formats, otherwise a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exact(pub f64);
 
 impl Serialize for Exact {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        if serializer.is_human_readable() {
-            serializer.collect_str(&format_args!("{:?}", self.0))
+        if serializer.is_human_readable() && !self.0.is_finite() {
+            serializer.collect_str(&self.0)
         } else {
             serializer.serialize_f64(self.0)
         }
@@ -99,32 +99,6 @@ impl Floats for f64 {
     }
 }
 
-/// Stored as the same number in `f64`.
-impl Floats for f32 {
-    type Form = Exact;
-
-    fn form(&self) -> Exact {
-        Exact((*self).into())
-    }
-
-    fn read(form: Exact) -> Option<Self> {
-        Some(form.0 as Self)
-    }
-}
-
-/// Integers beside floats are stored as they are.
-impl Floats for i64 {
-    type Form = Self;
-
-    fn form(&self) -> Self {
-        *self
-    }
-
-    fn read(form: Self) -> Option<Self> {
-        Some(form)
-    }
-}
-
 impl<T: Floats> Floats for Option<T> {
     type Form = Option<T::Form>;
 
@@ -174,19 +148,7 @@ impl<const R: usize, const C: usize> Floats for SMatrix<f64, R, C> {
     }
 }
 
-impl<A: Floats, B: Floats> Floats for (A, B) {
-    type Form = (A::Form, B::Form);
-
-    fn form(&self) -> Self::Form {
-        (self.0.form(), self.1.form())
-    }
-
-    fn read((a, b): Self::Form) -> Option<Self> {
-        Some((A::read(a)?, B::read(b)?))
-    }
-}
-
-/// Writes floats exactly. For use through `#[serde(with = "fewbits_numerics::stored")]`.
+/// Writes floats. For use through `#[serde(with = "fewbits_numerics::stored")]`.
 ///
 /// # Errors
 /// If the format returns an error.
@@ -194,7 +156,7 @@ pub fn serialize<T: Floats, S: Serializer>(value: &T, serializer: S) -> Result<S
     value.form().serialize(serializer)
 }
 
-/// Reads what [`serialize`] wrote, or plain numbers.
+/// Reads what [`serialize`] wrote, or numbers as text.
 ///
 /// # Errors
 /// If the format returns an error, an array has the wrong length, or a string is not a number.
@@ -202,81 +164,35 @@ pub fn deserialize<'de, T: Floats, D: Deserializer<'de>>(deserializer: D) -> Res
     T::read(T::Form::deserialize(deserializer)?).ok_or_else(|| D::Error::custom("an array of another length"))
 }
 
-/// Implements serde for a type whose constructor checks its arguments: lists the fields of the stored form, each with its type and its
-/// value, and the constructor that reads them. The type itself has the attribute `#[serde(try_from = "Form", into = "Form")]`. In the
-/// second form of the macro the fields have no values: the type is written by its own derive, `into` is left out, and the form and its
-/// fields may have serde attributes. A type with a dimension is written `[const D: usize] Type as Form`; its form is then `Form<D>`.
-///
-/// ```
-/// use fewbits_numerics::{ArgumentError, error::positive, stored};
-/// #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-/// #[serde(try_from = "Form", into = "Form")]
-/// struct Noise {
-///     deviation: f64,
-/// }
-///
-/// impl Noise {
-///     fn new(variance: f64) -> Result<Self, ArgumentError> {
-///         Ok(Self { deviation: positive("variance", variance)?.sqrt() })
-///     }
-/// }
-///
-/// stored! { Noise as Form |noise| {
-///     variance: f64 = noise.deviation * noise.deviation,
-/// } => Noise::new(variance), ArgumentError }
-///
-/// assert_eq!(serde_json::from_str::<Noise>(r#"{"variance": 4.0}"#).unwrap(), Noise { deviation: 2.0 });
-/// assert!(serde_json::from_str::<Noise>(r#"{"variance": -4.0}"#).is_err());
-/// assert_eq!(serde_json::to_string(&Noise { deviation: 3.0 }).unwrap(), r#"{"variance":9.0}"#);
-/// ```
-#[macro_export]
-macro_rules! stored {
-    ($(#[$meta:meta])* $([$(const $n:ident: usize),+])? $type:ident as $form:ident |$value:ident| { $($(#[$attribute:meta])* $field:ident: $kind:ty = $get:expr),+ $(,)? } => $make:expr, $error:ty) => {
-        $crate::stored! { #[derive(::serde::Serialize)] $(#[$meta])* $([$(const $n: usize),+])? $type as $form { $($(#[$attribute])* $field: $kind),+ } => $make, $error }
-
-        impl$(<$(const $n: usize),+>)? From<$type$(<$($n),+>)?> for $form$(<$($n),+>)? {
-            fn from($value: $type$(<$($n),+>)?) -> Self {
-                Self { $($field: $get),+ }
-            }
-        }
-    };
-    ($(#[$meta:meta])* $([$(const $n:ident: usize),+])? $type:ident as $form:ident { $($(#[$attribute:meta])* $field:ident: $kind:ty),+ $(,)? } => $make:expr, $error:ty) => {
-        #[derive(::serde::Deserialize)]
-        $(#[$meta])*
-        #[serde(deny_unknown_fields)]
-        struct $form$(<$(const $n: usize),+>)? { $($(#[$attribute])* $field: $kind),+ }
-
-        impl$(<$(const $n: usize),+>)? TryFrom<$form$(<$($n),+>)?> for $type$(<$($n),+>)? {
-            type Error = $error;
-
-            fn try_from($form { $($field),+ }: $form$(<$($n),+>)?) -> Result<Self, $error> {
-                $make
-            }
-        }
-    };
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// As a text, never as a number: no parser of numbers can change a bit. Random bit patterns.
+    /// Random bit patterns, infinities among them.
     #[test]
-    fn every_float_returns_to_the_bit_as_text() {
+    fn every_number_returns_to_the_bit() {
         let mut state = 1_u64;
-        for _ in 0..100_000 {
+        let random = (0..100_000).map(|_| {
             state = state
                 .wrapping_mul(6_364_136_223_846_793_005)
                 .wrapping_add(1_442_695_040_888_963_407);
-            let value = f64::from_bits(state ^ state >> 29);
-            if value.is_nan() {
-                continue;
-            }
-            let stored = serde_json::to_value(Exact(value)).unwrap();
-            assert!(stored.is_string());
-            assert_eq!(serde_json::from_value::<Exact>(stored).unwrap().0.to_bits(), value.to_bits());
+            f64::from_bits(state ^ state >> 29)
+        });
+        let special = [
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            -0.0,
+            f64::MIN_POSITIVE / 3.0,
+            f64::MAX,
+        ];
+        for value in special.into_iter().chain(random).filter(|value| !value.is_nan()) {
+            let text = serde_json::to_string(&Exact(value)).unwrap();
+            assert_eq!(serde_json::from_str::<Exact>(&text).unwrap().0.to_bits(), value.to_bits());
+            assert_eq!(text.starts_with('"'), value.is_infinite());
         }
+        let text = serde_json::to_string(&Exact(f64::NAN)).unwrap();
+        assert!(serde_json::from_str::<Exact>(&text).unwrap().0.is_nan());
     }
 
     #[test]

@@ -195,16 +195,9 @@ impl Quantizer {
         if symbol >= channel.outputs() {
             return refuse("symbol", symbol, format!("a number below {}", channel.outputs()));
         }
-        self.factor_of(noise_variance, |level| channel.probability(symbol, level))
-    }
-
-    /// The factor of an observation that has probability `given_level(l)` if level `l` was sent.
-    ///
-    /// # Errors
-    /// If a probability is outside `[0, 1]` or the variance is not a positive number.
-    pub fn factor_of(&self, noise_variance: f64, given_level: impl Fn(usize) -> f64) -> Result<Scalar, Error> {
         positive("noise_variance", noise_variance)?;
-        let given_cell: Vec<f64> = self.labels.iter().map(|l| given_level(*l)).collect();
+        let given = |level: &usize| channel.probability(symbol, *level);
+        let given_cell: Vec<f64> = self.labels.iter().map(given).collect();
         // A partition refuses an observation that no cell can cause.
         if given_cell.iter().all(|p| *p == 0.0) {
             return Ok(Constant::new(0.0)?.into());

@@ -18,7 +18,6 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Numbers")]
 pub struct StochasticTrigger {
-    #[serde(with = "fewbits_numerics::stored")]
     precision: f64,
 }
 
@@ -26,7 +25,6 @@ pub struct StochasticTrigger {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Numbers {
-    #[serde(with = "fewbits_numerics::stored")]
     precision: f64,
 }
 

@@ -7,13 +7,13 @@ use fewbits_core::{Belief, Density, Gaussian, Likelihood};
 use fewbits_densities::{Component, Mixture, systematic};
 use fewbits_diffusive::engine;
 use fewbits_diffusive::form::{Added, AddedDensity, AddedForm, SliceMoments, Update};
-use fewbits_diffusive::message::PackedBelief;
+use fewbits_diffusive::message::AddedNumbers;
 use fewbits_diffusive::{
     Error, Form, JointBelief, PositionBelief, Posterior, RateModel, SearchBox, SourceLikelihood, Travelling,
 };
 use fewbits_mixture_codec::{Clumps, MixtureFit};
-use fewbits_numerics::error::refuse;
-use nalgebra::{SVector, Vector2};
+use fewbits_numerics::error::{entries, refuse};
+use nalgebra::{SMatrix, SVector, Vector2};
 use std::fmt;
 use std::sync::Arc;
 
@@ -97,25 +97,45 @@ impl<const N: usize, const K: usize> AddedForm for LpgForm<N, K> {
         components * scalars(degree, with_rate)
     }
 
-    fn read(&self, packed: &PackedBelief, degree: usize) -> Result<Travelling, Error> {
-        Ok(if packed.with_rate {
-            Travelling::WithRate(JointBelief::Other(Arc::new(read::<3>(packed, degree)?)))
+    fn read(&self, added: &AddedNumbers) -> Result<Travelling, Error> {
+        Ok(if added.with_rate {
+            Travelling::WithRate(JointBelief::Other(Arc::new(read::<3>(added)?)))
         } else {
-            Travelling::Position(PositionBelief::Other(Arc::new(read::<2>(packed, degree)?)))
+            Travelling::Position(PositionBelief::Other(Arc::new(read::<2>(added)?)))
         })
     }
 }
 
-fn read<const D: usize>(packed: &PackedBelief, degree: usize) -> Result<Lpg<D>, Error> {
+fn read<const D: usize>(added: &AddedNumbers) -> Result<Lpg<D>, Error> {
     let size = engine::gaussian_scalars(D == 3);
-    let numbers = &packed.numbers;
-    let (gaussians, coefficients) = numbers.split_at(size.saturating_mul(packed.components).min(numbers.len()));
-    let gaussians: Vec<Component<D>> = gaussians
-        .chunks(size)
-        .map(|chunk| engine::read_gaussian(1.0, chunk))
-        .collect::<Result<_, _>>()?;
-    let lists = coefficients.chunks(scalars(degree, D == 3) - size).map(<[f64]>::to_vec);
-    Lpg::new(&gaussians, degree, &lists.collect::<Vec<_>>())
+    let numbers = &added.numbers;
+    let (gaussians, coefficients) = numbers.split_at(size.saturating_mul(added.components).min(numbers.len()));
+    let gaussians: Vec<Component<D>> = gaussians.chunks(size).map(read_gaussian).collect::<Result<_, _>>()?;
+    let lists = coefficients
+        .chunks(scalars(added.code, D == 3) - size)
+        .map(<[f64]>::to_vec);
+    Lpg::new(&gaussians, added.code, &lists.collect::<Vec<_>>())
+}
+
+/// Appends the numbers of a Gaussian: its mean and its lower Cholesky factor, row by row.
+fn push_gaussian<const D: usize>(c: &Component<D>, numbers: &mut Vec<f64>) {
+    numbers.extend(c.mean().iter());
+    for i in 0..D {
+        numbers.extend((0..=i).map(|j| c.factor().lower[(i, j)]));
+    }
+}
+
+/// The Gaussian of these numbers.
+fn read_gaussian<const D: usize>(numbers: &[f64]) -> Result<Component<D>, Error> {
+    entries("numbers", numbers.len(), engine::gaussian_scalars(D == 3))?;
+    let (mean, mut rest) = numbers.split_at(D);
+    let mut lower = SMatrix::<f64, D, D>::zeros();
+    for i in 0..D {
+        let (row, others) = rest.split_at(i + 1);
+        (0..=i).for_each(|j| lower[(i, j)] = row[j]);
+        rest = others;
+    }
+    Component::new(1.0, SVector::from_column_slice(mean), lower * lower.transpose())
 }
 
 /// Polynomial Gaussians about the position of a posterior: at most so many, of this degree.
@@ -192,7 +212,7 @@ where
 
     fn numbers(&self) -> (usize, usize, Vec<f64>) {
         let mut numbers = Vec::new();
-        self.gaussians().for_each(|c| engine::push_gaussian(c, &mut numbers));
+        self.gaussians().for_each(|c| push_gaussian(c, &mut numbers));
         self.coefficients().for_each(|list| numbers.extend_from_slice(list));
         (self.gaussians().count(), self.degree(), numbers)
     }

@@ -1,12 +1,8 @@
 //! A sensor with a one-bit quantizer, as a scheme.
 
 use crate::{BinaryQuantizer, Error};
-use fewbits_core::factor::{Constant, Scalar};
-use fewbits_core::nalgebra::SVector;
-use fewbits_core::rand::Rng;
-use fewbits_core::{Deterministic, Link, Observation, Scheme};
+use fewbits_core::{Noise, Quantized};
 use fewbits_numerics::error::positive;
-use fewbits_quantizers::Quantizer;
 use serde::{Deserialize, Serialize};
 
 /// A sensor that measures `Y = X + N(0, noise_deviation^2)` and reports the bit of its quantizer.
@@ -72,38 +68,37 @@ impl PatternSensor {
     }
 }
 
-/// The report is the bit of the cell that contains the measurement. A missing report carries no information about the measurement.
-impl Deterministic<1> for PatternSensor {}
-
-impl Scheme<1> for PatternSensor {
-    type State = ();
+/// The report is the bit of the cell that contains the measurement.
+impl Quantized for PatternSensor {
     type Feedback = ();
     type Report = bool;
-    type Factor = Scalar;
 
-    fn feedback_format(&self) {}
+    fn format_of_feedback(&self) {}
 
-    fn report_format(&self) {}
+    fn format_of_report(&self) {}
 
-    fn encode(
-        &self,
-        _: &mut dyn Rng,
-        (): &mut (),
-        measurement: &SVector<f64, 1>,
-        (): &(),
-    ) -> Result<Option<bool>, fewbits_core::Error> {
-        Ok(Some(self.quantizer().encode(measurement[0])?))
+    fn measurement_noise(&self) -> Noise {
+        (self.noise_deviation * self.noise_deviation).into()
     }
 
-    fn factor(&self, (): &(), observation: &Observation<bool>, link: &Link) -> Result<Scalar, fewbits_core::Error> {
-        let bit = match observation {
-            Observation::Received(bit) => *bit,
-            missing => return Ok(Constant::of_delivery(missing, link).into()),
-        };
-        let given = link.received_given_words(0..2, u64::from(bit), 1)?;
-        let cells = Quantizer::try_from(self.quantizer())?;
-        let variance = self.noise_deviation() * self.noise_deviation();
-        Ok(cells.factor_of(variance, |level| given[level])?)
+    fn report_of(&self, measurement: f64, (): &()) -> Result<bool, fewbits_core::Error> {
+        Ok(self.quantizer.encode(measurement)?)
+    }
+
+    fn edges(&self, (): &()) -> Result<Vec<f64>, fewbits_core::Error> {
+        Ok(self.quantizer.breakpoints().to_vec())
+    }
+
+    fn words(&self) -> impl Iterator<Item = u64> {
+        (0..=self.quantizer.breakpoints().len() as u64).map(|cell| cell % 2)
+    }
+
+    fn word_of(&self, bit: &bool) -> Result<u64, fewbits_core::Error> {
+        Ok(u64::from(*bit))
+    }
+
+    fn word_bits(&self) -> u32 {
+        1
     }
 }
 
@@ -111,7 +106,8 @@ impl Scheme<1> for PatternSensor {
 mod tests {
     use super::*;
     use fewbits_core::laws::{factor, message, scheme};
-    use fewbits_core::{Gaussian, Message, Scheme};
+    use fewbits_core::nalgebra::SVector;
+    use fewbits_core::{Gaussian, Link, Message, Observation, Scheme};
     use rand::{RngExt, SeedableRng};
 
     #[test]

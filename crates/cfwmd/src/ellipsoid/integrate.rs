@@ -1,6 +1,6 @@
 //! Quadrature over the angle `theta` of the leading component, `q_1 = radius sin(theta)`.
 
-use fewbits_numerics::quadrature::gauss_legendre;
+use fewbits_numerics::quadrature::{Stop, by_halves, gauss_legendre};
 use fewbits_numerics::{bisect, golden};
 use std::f64::consts::FRAC_PI_2;
 
@@ -77,27 +77,22 @@ fn adaptive(
     visit: &mut impl FnMut(f64, f64),
 ) {
     let mass = |a: f64, b: f64| panel(a, b).map(|(theta, w)| w * (f(theta) - peak).exp()).sum::<f64>();
-    // Depth first: the panel on top of the stack is the leftmost.
-    let panels = cuts
+    let panels: Vec<_> = cuts
         .windows(2)
-        .map(|pair| (pair[0], pair[1], mass(pair[0], pair[1]), 0));
-    let mut waiting: Vec<_> = panels.rev().collect();
-    let whole: f64 = waiting.iter().map(|panel| panel.2).sum();
-    // A NaN would never meet the tolerance: all panels would be halved to the limit.
+        .map(|pair| ([pair[0], pair[1]], mass(pair[0], pair[1])))
+        .collect();
+    let whole: f64 = panels.iter().rev().map(|panel| panel.1).sum();
     if !whole.is_finite() {
         return;
     }
-    while let Some((a, b, coarse, depth)) = waiting.pop() {
-        let middle = 0.5 * (a + b);
-        let (left, right) = (mass(a, middle), mass(middle, b));
-        if (left + right - coarse).abs() <= tolerance * whole || depth == halvings {
-            panel(a, middle)
-                .chain(panel(middle, b))
-                .for_each(|(theta, w)| visit(theta, w));
-        } else {
-            waiting.push((middle, b, right, depth + 1));
-            waiting.push((a, middle, left, depth + 1));
-        }
+    let stop = Stop {
+        tolerance: tolerance * whole,
+        halvings,
+    };
+    for (ends, coarse) in panels {
+        by_halves(ends, coarse, stop, &mass, &mut |a, b| {
+            panel(a, b).for_each(|(theta, w)| visit(theta, w));
+        });
     }
 }
 

@@ -9,7 +9,8 @@ pub use quadrature::EllipsoidMoments;
 
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::non_negative;
-use fewbits_numerics::linalg::definite_factor;
+use fewbits_numerics::factored::Factored;
+use fewbits_numerics::linalg::symmetrised;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
@@ -30,7 +31,6 @@ pub struct Ellipsoid<const M: usize> {
 struct Numbers<const M: usize> {
     #[serde(with = "fewbits_numerics::stored")]
     innovation_covariance: SMatrix<f64, M, M>,
-    #[serde(with = "fewbits_numerics::stored")]
     threshold: f64,
 }
 
@@ -57,10 +57,9 @@ impl<const M: usize> Ellipsoid<M> {
     /// # Errors
     /// If an entry is not finite, `S` is not positive definite or the threshold is negative.
     pub fn new(innovation_covariance: &SMatrix<f64, M, M>, threshold: f64) -> Result<Self, ArgumentError> {
-        let (innovation_covariance, lower) = definite_factor("innovation_covariance", innovation_covariance)?;
         Ok(Self {
-            lower,
-            innovation_covariance,
+            lower: Factored::new("innovation_covariance", innovation_covariance)?.lower,
+            innovation_covariance: symmetrised(innovation_covariance),
             threshold: non_negative("threshold", threshold)?,
         })
     }

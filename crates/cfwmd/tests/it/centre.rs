@@ -72,7 +72,8 @@ fn run(loss: f64, slots: u32, seed: u64) -> Outcome {
 }
 
 fn heard_of_all_living(centre: &FusionCentre<1, MomentFilter>) -> bool {
-    (DEAD..SENSORS).all(|number| !centre.is_named_dead(number).unwrap() && centre.working(number).unwrap() > 0.5)
+    (DEAD..SENSORS)
+        .all(|number| !centre.sensor(number).unwrap().declared_dead && centre.sensor(number).unwrap().working > 0.5)
 }
 
 #[test]
@@ -135,5 +136,5 @@ fn a_lost_report_is_no_silence() {
             .receive(&mut rng, &[Slot::new(0, feedback, Observation::Lost)])
             .unwrap();
     }
-    assert!(!centre.is_named_dead(0).unwrap());
+    assert!(!centre.sensor(0).unwrap().declared_dead);
 }

@@ -173,7 +173,7 @@ fn a_rule_that_changes_from_slot_to_slot_is_renewed() {
     let mut belief = prior();
     for k in 1..=6_u32 {
         centre.advance(&mut rng, f64::from(k)).unwrap();
-        let working = centre.working(0).unwrap();
+        let working = centre.sensor(0).unwrap().working;
         belief = centre.estimate();
         let rules = network.rules_under(&belief).unwrap();
         for (number, rule) in (0..).zip(&rules) {
@@ -181,14 +181,14 @@ fn a_rule_that_changes_from_slot_to_slot_is_renewed() {
                 .renew(number, network.remote_under(number as usize, rule).unwrap())
                 .unwrap();
         }
-        assert_eq!(centre.working(0).unwrap(), working);
+        assert_eq!(centre.sensor(0).unwrap().working, working);
         let told = centre.feedback(0).unwrap();
         assert_eq!(told.bits(), 128, "two numbers, no covariance");
         let slots: Vec<Slot> = (0..SENSORS as u32)
             .map(|number| Slot::new(number, told.clone(), Observation::Nothing))
             .collect();
         centre.receive(&mut rng, &slots).unwrap();
-        assert!(centre.working(0).unwrap() < 1.0);
+        assert!(centre.sensor(0).unwrap().working < 1.0);
     }
     assert!(centre.estimate().covariance()[(0, 0)] < belief.covariance()[(0, 0)]);
     assert!(centre.renew(9, network.remote(0).unwrap()).is_err() && network.remote(5).is_err());

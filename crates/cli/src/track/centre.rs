@@ -9,7 +9,9 @@ use crate::error::Failure;
 use crate::report::Report;
 use fewbits_core::{BitString, Gaussian, Link, Message, NumberFormat, Observation, OnAxes, SensorNode};
 use fewbits_filters::calibration;
-use fewbits_filters::centre::{Event, Failures, FalseAlarms, FusionCentre, NoiseLearning, ReportTest, Reporting, Slot};
+use fewbits_filters::centre::{
+    Event, Failures, FalseAlarms, FusionCentre, NoiseLearning, ReportTest, Reporting, SensorState, Slot,
+};
 use fewbits_filters::smoother::{Filtered, smooth};
 use fewbits_filters::{MomentFilter, MovingGridFilter, StateFilter};
 use fewbits_models::{ContinuousLinear, LinearSensor};
@@ -303,13 +305,12 @@ impl<const D: usize, F: StateFilter<D>> Estimator for Centre<D, F> {
 
     fn health(&self, sensor: usize) -> (f64, bool) {
         let number = sensor as u32;
-        let dead = self.centre.is_named_dead(number).unwrap_or(true);
-        let excluded = self.centre.is_excluded(number).unwrap_or(true);
-        (self.centre.working(number).unwrap_or(0.0), !dead && !excluded)
+        let used = |state: SensorState| (state.working, !state.declared_dead && !state.excluded);
+        self.centre.sensor(number).map_or((0.0, false), used)
     }
 
     fn rejected(&self, sensor: usize) -> u64 {
-        self.centre.rejected(sensor as u32).unwrap_or(0)
+        self.centre.sensor(sensor as u32).map_or(0, |state| state.rejected)
     }
 
     fn smoothed(&self, lag: Option<f64>) -> Result<Vec<Vec<(f64, f64)>>, Failure> {

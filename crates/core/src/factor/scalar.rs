@@ -14,7 +14,6 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Constant {
-    #[serde(with = "fewbits_numerics::stored")]
     probability: f64,
 }
 

@@ -23,7 +23,7 @@ pub struct Value<const M: usize> {
 #[serde(deny_unknown_fields)]
 struct Parts<const M: usize> {
     noise: Gaussian<M>,
-    #[serde(default, with = "fewbits_numerics::stored")]
+    #[serde(default)]
     log_scale: f64,
 }
 

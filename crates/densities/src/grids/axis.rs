@@ -8,9 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored")]
 pub struct UniformGrid {
-    #[serde(with = "fewbits_numerics::stored")]
     lower: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     spacing: f64,
     points: usize,
 }
@@ -20,9 +18,7 @@ pub struct UniformGrid {
 #[serde(rename = "Grid")]
 #[serde(deny_unknown_fields)]
 struct Stored {
-    #[serde(with = "fewbits_numerics::stored")]
     lower: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     spacing: f64,
     points: usize,
 }

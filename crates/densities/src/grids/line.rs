@@ -15,7 +15,6 @@ use serde::{Deserialize, Serialize};
 #[serde(try_from = "Stored")]
 pub struct PointMass {
     grid: UniformGrid,
-    #[serde(with = "fewbits_numerics::stored")]
     density: Vec<f64>,
 }
 
@@ -25,7 +24,6 @@ pub struct PointMass {
 #[serde(deny_unknown_fields)]
 struct Stored {
     grid: UniformGrid,
-    #[serde(with = "fewbits_numerics::stored")]
     density: Vec<f64>,
 }
 

@@ -242,7 +242,6 @@ impl Mixture<1> {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Stored<const D: usize> {
-    #[serde(with = "fewbits_numerics::stored")]
     weights: Vec<f64>,
     #[serde(with = "fewbits_numerics::stored")]
     means: Vec<[f64; D]>,

@@ -6,9 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename = "Particles", deny_unknown_fields)]
 pub(super) struct StoredParticles {
-    #[serde(with = "fewbits_numerics::stored")]
     pub(super) columns: Vec<Vec<f64>>,
-    #[serde(with = "fewbits_numerics::stored")]
     pub(super) weights: Vec<f64>,
     /// Empty if all weights are equal.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -16,9 +14,7 @@ pub(super) struct StoredParticles {
     pub(super) log_weights: Vec<Option<f64>>,
     /// Stored as it was computed, so that a resumed filter gives the same bits.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[serde(with = "fewbits_numerics::stored")]
     pub(super) effective_sample_size: Option<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[serde(with = "fewbits_numerics::stored")]
     pub(super) auxiliary: Vec<f64>,
 }

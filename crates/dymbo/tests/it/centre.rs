@@ -337,8 +337,8 @@ impl<F: StateFilter<4>> Plane<F> {
 fn three_kinds<F: StateFilter<4>>(filter: F) -> f64 {
     let mut plane = Plane::new(filter, 3);
     let squares: f64 = (0..200).map(|k| plane.step(k)).sum();
-    assert!(plane.centre.working(1).unwrap() < 0.01 && plane.centre.is_named_dead(1).unwrap());
-    assert!(plane.centre.working(0).unwrap() > 0.9 && !plane.centre.is_named_dead(0).unwrap());
+    assert!(plane.centre.sensor(1).unwrap().working < 0.01 && plane.centre.sensor(1).unwrap().declared_dead);
+    assert!(plane.centre.sensor(0).unwrap().working > 0.9 && !plane.centre.sensor(0).unwrap().declared_dead);
     (squares / 200.0).sqrt()
 }
 
@@ -471,7 +471,7 @@ fn refused_calls_leave_the_centre_as_it_was() {
         .receive(&mut plane.filter_rng, &[slots[0].clone(), crossed])
         .unwrap();
     assert_eq!(found.events, [Event::Rejected(2)]);
-    assert_eq!((plane.centre.estimate(), plane.centre.rejected(2).unwrap()), (alone, 1));
+    assert_eq!((plane.centre.estimate(), plane.centre.sensor(2).unwrap().rejected), (alone, 1));
     assert!(plane.centre.leave(2) && !plane.centre.leave(2) && plane.centre.feedback(2).is_err());
 }
 

@@ -37,7 +37,7 @@ const LITTLE: f64 = 1.0;
 const SETTLED: f64 = 0.125;
 const FAR: i32 = 16;
 /// A sensor with fewer values than this has the noise that all have together.
-const FEWEST: usize = 12;
+const MIN_READINGS: usize = 12;
 
 /// The readings of one instant.
 #[derive(Debug, Clone, PartialEq)]
@@ -181,7 +181,7 @@ where
         found.improve(&[own_change.clone(), together.clone()], &STEPS);
         let single: Vec<Vec<usize>> = together
             .iter()
-            .filter(|axis| counts[**axis - 1] >= FEWEST)
+            .filter(|axis| counts[**axis - 1] >= MIN_READINGS)
             .map(|axis| vec![*axis])
             .chain([own_change])
             .collect();

@@ -17,6 +17,7 @@
 //! residual; it is tested by [presence](super::presence).
 
 use crate::Error;
+use fewbits_numerics::bisect;
 use fewbits_numerics::error::within;
 use fewbits_numerics::normal::cdf;
 use serde::{Deserialize, Serialize};
@@ -182,15 +183,7 @@ fn limit(rate: f64, drift: f64) -> Limit {
     let steps = 2.0 / rate;
     let run = |b: f64| ((2.0 * drift * b).exp_m1() - 2.0 * drift * b) / (2.0 * drift * drift);
     // Each of two sides may raise half of the alarms. The run length grows with `b`; exp(200) is far above every rate allowed.
-    let (mut low, mut high) = (0.0, 100.0 / drift);
-    for _ in 0..60 {
-        let middle: f64 = 0.5 * (low + high);
-        if run(middle) < steps {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
+    let (low, _) = bisect::boundary(|b| run(b) < steps, 0.0, 100.0 / drift, 60);
     let limit = (low - 1.166).max(0.5);
     Limit { drift, limit }
 }

@@ -19,7 +19,7 @@ const DECISIVE: f64 = 15.0;
 /// Share of the past that counts for that, at each report.
 const MEMORY: f64 = 0.98;
 /// Largest depth of a single report that counts, in nats.
-const DEEPEST: f64 = 1e3;
+const MAX_DEPTH: f64 = 1e3;
 /// Mean depth of the reports of a right model: half a squared standard normal variable.
 const USUAL_DEPTH: f64 = 0.5;
 
@@ -98,7 +98,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 }
                 None => [Some(CLIP), None, None],
             };
-            let depth = apart.map_or(DEEPEST, |found| found.depth.min(DEEPEST));
+            let depth = apart.map_or(MAX_DEPTH, |found| found.depth.min(MAX_DEPTH));
             state.depth = MEMORY * state.depth + depth - USUAL_DEPTH;
             let is_alarm = state.monitor.add(terms, &self.limits.sensor) == Some(Alarm::Contradiction);
             // A report that is too unlikely beside another begins a dispute of both at once.

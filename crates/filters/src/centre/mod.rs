@@ -44,7 +44,7 @@ pub use health::{FalseAlarms, Health};
 pub use learning::NoiseLearning;
 pub use presence::Failures;
 pub use remote::{RemoteSensor, ReportTest, Reporting};
-pub use slot::{Event, Received, Slot};
+pub use slot::{Event, Received, SensorState, Slot};
 pub use state::CentreState;
 
 use crate::Error;
@@ -274,52 +274,20 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         self.dropped
     }
 
-    /// Probability that a sensor still works.
+    /// What the centre knows of a sensor.
     ///
     /// # Errors
     /// If there is no such sensor.
-    pub fn working(&self, number: u32) -> Result<f64, Error> {
-        Ok(self.member(number)?.state.presence.working)
-    }
-
-    /// Whether a sensor has been declared dead because of its silence.
-    ///
-    /// # Errors
-    /// If there is no such sensor.
-    pub fn is_named_dead(&self, number: u32) -> Result<bool, Error> {
-        Ok(self.member(number)?.state.presence.named_dead)
-    }
-
-    /// Whether a sensor's reports are at present not used, because they contradict the others'.
-    ///
-    /// # Errors
-    /// If there is no such sensor.
-    pub fn is_excluded(&self, number: u32) -> Result<bool, Error> {
-        Ok(self.member(number)?.state.excluded)
-    }
-
-    /// Whether a sensor contradicts another, and nothing decides which of the two is wrong.
-    ///
-    /// # Errors
-    /// If there is no such sensor.
-    pub fn is_disputed(&self, number: u32) -> Result<bool, Error> {
-        Ok(self.member(number)?.state.disputed)
-    }
-
-    /// Number of reports of a sensor that were not used because they were impossible or too unlikely.
-    ///
-    /// # Errors
-    /// If there is no such sensor.
-    pub fn rejected(&self, number: u32) -> Result<u64, Error> {
-        Ok(self.member(number)?.state.rejected)
-    }
-
-    /// Number of copies of a sensor's reports that were dropped.
-    ///
-    /// # Errors
-    /// If there is no such sensor.
-    pub fn copies(&self, number: u32) -> Result<u64, Error> {
-        Ok(self.member(number)?.state.copies)
+    pub fn sensor(&self, number: u32) -> Result<SensorState, Error> {
+        let state = &self.member(number)?.state;
+        Ok(SensorState {
+            working: state.presence.working,
+            declared_dead: state.presence.named_dead,
+            excluded: state.excluded,
+            disputed: state.disputed,
+            rejected: state.rejected,
+            copies: state.copies,
+        })
     }
 
     /// Index of a sensor, or the index at which to insert it. Slots are mostly in order, so `guess` is tried first.

@@ -53,11 +53,8 @@ impl Failures {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Presence {
-    #[serde(with = "fewbits_numerics::stored")]
     pub working: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     alone: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     struck: f64,
     #[serde(with = "fewbits_numerics::stored")]
     statistic: f64,
@@ -113,7 +110,7 @@ const SETTLED: f64 = 0.999;
 /// The probability that a common failure has struck.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
-pub(super) struct Outage(#[serde(with = "fewbits_numerics::stored")] f64);
+pub(super) struct Outage(f64);
 
 /// `working`, if a common failure has this probability. Rounding must not leave it above one.
 fn mixed(common: f64, sensor: &Presence) -> f64 {

@@ -97,3 +97,21 @@ pub struct Received {
     /// Events of this instant.
     pub events: Vec<Event>,
 }
+
+/// What a centre knows of one sensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct SensorState {
+    /// Probability that it still works.
+    pub working: f64,
+    /// Whether it has been declared dead because of its silence.
+    pub declared_dead: bool,
+    /// Whether its reports are at present not used, because they contradict the others'.
+    pub excluded: bool,
+    /// Whether it contradicts another sensor, and nothing decides which of the two is wrong.
+    pub disputed: bool,
+    /// Number of its reports that were not used because they were impossible or too unlikely.
+    pub rejected: u64,
+    /// Number of copies of its reports that were dropped.
+    pub copies: u64,
+}

@@ -69,7 +69,6 @@ impl MemberState {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Checkpoint<B> {
-    #[serde(with = "fewbits_numerics::stored")]
     pub time: f64,
     pub belief: B,
     pub slots: Vec<StoredSlot>,
@@ -82,7 +81,6 @@ pub(super) struct StoredSlot {
     pub sensor: u32,
     feedback: BitString,
     observation: Observation<BitString>,
-    #[serde(with = "fewbits_numerics::stored")]
     pub working: f64,
     pub used: bool,
     /// `ln p` of a wrong report, if this one contradicts others of its instant and one of them is taken to be wrong.
@@ -122,14 +120,12 @@ impl StoredSlot {
 /// The state of a centre: everything except its models, its filter and its settings, which the program must provide again.
 ///
 /// It can be stored as bytes ([`to_bytes`](Self::to_bytes)) or in any format of serde. A restored centre continues with the same bits,
-/// given the same random stream, because floats are stored exactly in every format ([`mod@fewbits_numerics::stored`]).
+/// given the same random stream. JSON must be read by a parser that rounds correctly ([`mod@fewbits_numerics::stored`]).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CentreState<B> {
     version: u32,
-    #[serde(with = "fewbits_numerics::stored")]
     now: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     noise_scale: f64,
     belief: B,
     members: BTreeMap<u32, MemberState>,

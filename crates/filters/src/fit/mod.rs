@@ -34,7 +34,7 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 
 /// Readings of a sensor from which anything is found, at least.
-const FEWEST: usize = 12;
+const MIN_READINGS: usize = 12;
 
 /// What is looked for, beside change, noises and biases.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -199,7 +199,7 @@ fn useless(instants: &[Instant], sensor: usize) -> Option<Refusal> {
         .filter(|(other, _)| *other == sensor);
     let count = own.clone().count();
     let first = own.next();
-    let (quantity, reason) = if count < FEWEST {
+    let (quantity, reason) = if count < MIN_READINGS {
         (Quantity::Noise(sensor), "it has fewer than 12 readings, which are left out")
     } else if own.all(|one| Some(one) == first) {
         (Quantity::Bias(sensor), "its readings are all alike, and left out")
@@ -215,7 +215,7 @@ fn useless(instants: &[Instant], sensor: usize) -> Option<Refusal> {
 /// The sensor to which all else is relative, and what cannot be found therefore.
 /// `all`: with the readings that are left out.
 fn anchor(series: &[Vec<(f64, f64)>], all: &[Instant], request: &Request) -> Result<(usize, Vec<Refusal>), Error> {
-    let of_values = |sensor: &usize| series[*sensor].len() >= FEWEST;
+    let of_values = |sensor: &usize| series[*sensor].len() >= MIN_READINGS;
     if let Some(reference) = request.reference {
         if reference >= series.len() || !of_values(&reference) {
             return refuse("reference", reference, "a sensor of at least 12 values");

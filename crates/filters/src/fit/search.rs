@@ -7,7 +7,7 @@ const STEPS: usize = 80;
 const HALVINGS: usize = 14;
 const DIFFERENCE: f64 = 1e-4;
 /// Longest step in a coordinate.
-const LONGEST: f64 = 1.5;
+const MAX_STEP: f64 = 1.5;
 
 fn gradient(of: &impl Fn(&DVector<f64>) -> f64, at: &DVector<f64>) -> DVector<f64> {
     DVector::from_fn(at.len(), |i, _| {
@@ -59,8 +59,8 @@ pub(super) fn maximum(
             step = slope.clone();
         }
         let longest = step.amax();
-        if longest > LONGEST {
-            step *= LONGEST / longest;
+        if longest > MAX_STEP {
+            step *= MAX_STEP / longest;
         }
         let (mut share, mut next) = (1.0, None);
         for _ in 0..HALVINGS {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// A test fails beyond so many deviations: once in a thousand tests of a right model.
 const FAILED: f64 = 3.3;
 /// Instants from which a correlation is found, at least.
-const FEWEST: usize = 12;
+const MIN_READINGS: usize = 12;
 
 /// The test of a sensor of values, from its standardised innovations: under the right model they are independent, of mean square one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -50,7 +50,7 @@ pub(super) fn of(residuals: &[Vec<f64>]) -> Vec<SensorTest> {
         let count = kept.len() as f64;
         let mean_square = kept.iter().map(|score| score * score).sum::<f64>() / count;
         let products: f64 = kept.windows(2).map(|pair| pair[0] * pair[1]).sum();
-        (kept.len() >= FEWEST).then(|| SensorTest {
+        (kept.len() >= MIN_READINGS).then(|| SensorTest {
             sensor,
             values: all.len(),
             mean_square,
@@ -147,7 +147,7 @@ pub(super) fn correlations(instants: &[Instant], model: &LevelModel, reference: 
                 Some((own.value * its.value - shared) / (first.noise * second.noise))
             };
             let products: Vec<f64> = rows.iter().filter_map(product).collect();
-            if products.len() < FEWEST {
+            if products.len() < MIN_READINGS {
                 continue;
             }
             let number = products.len() as f64;

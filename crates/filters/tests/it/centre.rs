@@ -78,7 +78,7 @@ fn a_sensor_that_was_silent_returns() {
                     "{case}: {events:?}"
                 );
                 assert!(gap < 40 || count(Event::Alive(1)) == 1, "{case}: {events:?}");
-                assert!(centre.working(1).unwrap() == 1.0 && !centre.is_named_dead(1).unwrap(), "{case}");
+                assert!(centre.sensor(1).unwrap().working == 1.0 && !centre.sensor(1).unwrap().declared_dead, "{case}");
                 assert!((centre.estimate().mean()[0] - truth[0]).abs() < 3.0, "{case}");
             }
         }
@@ -105,7 +105,7 @@ fn an_impossible_report_costs_no_other() {
             {
                 assert!(with.estimate() == without.estimate(), "{health:?} {wild}");
                 assert_eq!(received.events, [Event::Rejected(2)], "{health:?} {wild}");
-                assert_eq!(with.rejected(2).unwrap(), 1);
+                assert_eq!(with.sensor(2).unwrap().rejected, 1);
             }
             assert!(with.estimate().is_finite());
         }
@@ -119,7 +119,7 @@ fn an_impossible_report_costs_no_other() {
         let slots = [slot(2, 1e154), slot(0, 0.5), slot(1, -0.2)];
         events.extend(centre.receive(&mut rng, &slots).unwrap().events);
     }
-    assert!(centre.is_excluded(2).unwrap() && events.contains(&Event::Excluded(2)), "{events:?}");
+    assert!(centre.sensor(2).unwrap().excluded && events.contains(&Event::Excluded(2)), "{events:?}");
 }
 
 fn order_is_nothing<F: StateFilter<1, Belief: PartialEq>>(filter: impl Fn() -> F) {
@@ -318,7 +318,7 @@ fn of_two_sensors_that_contradict_each_other_neither_is_believed() {
                 let off = (belief.mean()[0] - 5.0).abs() / belief.covariance()[(0, 0)].sqrt();
                 cover.add(f64::from(u8::from(off < 1.96)));
             }
-            assert!(disputed && centre.is_disputed(0).unwrap(), "{offset}");
+            assert!(disputed && centre.sensor(0).unwrap().disputed, "{offset}");
         }
         assert!(cover.mean() > 0.93, "{offset}: cover {}", cover.mean());
     }
@@ -337,7 +337,7 @@ fn a_prediction_decides_between_two() {
         events.extend(centre.receive(&mut rng, &slots).unwrap().events);
         assert!(centre.estimate().mean()[0].abs() < 3.0);
     }
-    assert!(centre.is_excluded(0).unwrap() && !centre.is_excluded(1).unwrap(), "{events:?}");
+    assert!(centre.sensor(0).unwrap().excluded && !centre.sensor(1).unwrap().excluded, "{events:?}");
 }
 
 /// A single sensor: a wild value is not used, a jump of the level is followed.
@@ -383,7 +383,7 @@ fn a_copy_of_a_report_is_dropped_and_counted() {
         assert!(!thrice.late(&mut rng, f64::from(k), &[other]).unwrap());
     }
     assert!(once.estimate() == thrice.estimate());
-    assert_eq!((thrice.copies(0).unwrap(), thrice.copies(1).unwrap()), (18, 9));
+    assert_eq!((thrice.sensor(0).unwrap().copies, thrice.sensor(1).unwrap().copies), (18, 9));
 }
 
 #[test]
@@ -400,7 +400,7 @@ fn a_late_report_is_gated_and_never_ends_the_centre() {
         centre.late(&mut rng, 5.5, &[slot(1, wild)]).unwrap();
         assert!((centre.estimate().mean() - before.mean()).amax() < 1e-9);
     }
-    assert_eq!(centre.rejected(1).unwrap(), 2);
+    assert_eq!(centre.sensor(1).unwrap().rejected, 2);
 }
 
 /// A filter that cannot start again.

@@ -1,6 +1,6 @@
 //! The filter on a lattice against Kalman's and the scalar filter.
 
-use fewbits_filters::{Error, Lattice, LatticeFilter, PointMass, TransitionKernel, UniformGrid};
+use fewbits_filters::{Error, Lattice, LatticeKernel, PointMass, TransitionKernel, UniformGrid};
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::TAU;
 
@@ -22,7 +22,7 @@ fn a_linear_model_is_kalmans() {
             y.iter().map(|y| 0.9 * y).collect(),
         ];
         let deviations = [vec![0.4 * unit; x.len()], vec![0.3 * unit; x.len()]];
-        let filter = LatticeFilter::new(means, deviations, &belief).unwrap();
+        let filter = LatticeKernel::new(means, deviations, &belief).unwrap();
         let (transition, noise) = (Matrix2::new(0.8, 0.5, 0.0, 0.9), Matrix2::new(0.16, 0.0, 0.0, 0.09));
         let (mut mean, mut covariance) = (Vector2::new(1.0, -0.5), Matrix2::new(1.0, 0.0, 0.0, 0.25));
         for z in [0.7, -0.2, 1.1, 0.4] {
@@ -53,7 +53,7 @@ fn one_axis_is_the_scalar_filter() {
     let (mut a, mut b) =
         (PointMass::normal(grid, 0.5, 1.0).unwrap(), Lattice::normal(vec![grid], &[0.5], &[1.0]).unwrap());
     let (means, deviations) = moved.into_iter().unzip();
-    let filter = LatticeFilter::new([means], [deviations], &b).unwrap();
+    let filter = LatticeKernel::new([means], [deviations], &b).unwrap();
     for z in [0.4, 0.9] {
         let logs = measured(grid.nodes().map(f64::abs), z, 0.2);
         (a, b) = (line.predict(&a).unwrap(), filter.predict(&b).unwrap());
@@ -76,7 +76,7 @@ fn three_independent_axes_are_three_lines() {
         .iter()
         .map(|grid| vec![1.2 * grid.spacing(); start.density().len()])
         .collect();
-    let next = LatticeFilter::new(positions, deviations, &start)
+    let next = LatticeKernel::new(positions, deviations, &start)
         .unwrap()
         .predict(&start)
         .unwrap();
@@ -105,12 +105,12 @@ fn what_does_not_fit_is_refused_and_changes_nothing() {
         other => panic!("{other}"),
     };
     let of = |mean: f64, deviation: f64| {
-        LatticeFilter::new([vec![mean; nodes], vec![mean; nodes]], vec![vec![deviation; nodes]; 2], &before)
+        LatticeKernel::new([vec![mean; nodes], vec![mean; nodes]], vec![vec![deviation; nodes]; 2], &before)
     };
     assert_eq!(name(of(f64::NAN, 1.0).unwrap_err()), "means");
     assert_eq!(name(of(0.5, 0.2).unwrap_err()), "deviations");
     assert_eq!(name(of(0.5, f64::INFINITY).unwrap_err()), "deviations");
-    assert_eq!(name(LatticeFilter::new([vec![0.0; nodes]], [vec![1.0; nodes]], &before).unwrap_err()), "means");
+    assert_eq!(name(LatticeKernel::new([vec![0.0; nodes]], [vec![1.0; nodes]], &before).unwrap_err()), "means");
     assert_eq!(of(1e6, 1.0).unwrap().predict(&before), Err(Error::Impossible));
     assert_eq!(belief.update(&vec![f64::NEG_INFINITY; nodes]), Err(Error::Impossible));
     assert!(matches!(belief.update(&vec![f64::NAN; nodes]), Err(Error::NotANumber { .. })));

@@ -11,11 +11,8 @@ use serde::{Deserialize, Serialize};
 pub struct WireFormat<const D: usize> {
     #[serde(with = "fewbits_numerics::stored")]
     pub(super) centre: SVector<f64, D>,
-    #[serde(with = "fewbits_numerics::stored")]
     pub(super) half_width: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     pub(super) unit: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     pub(super) resolutions: Vec<f64>,
 }
 
@@ -64,11 +61,8 @@ impl<const D: usize> WireFormat<D> {
 struct StoredFormat<const D: usize> {
     #[serde(with = "fewbits_numerics::stored")]
     centre: SVector<f64, D>,
-    #[serde(with = "fewbits_numerics::stored")]
     half_width: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     unit: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     resolutions: Vec<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Encoding of a mixture in a few bytes.
+//! Encoding of a mixture: in a few bytes ([`CodedMixture`]), or as plain numbers ([`RoundedMixture`]).
 //!
 //! Parameters are quantised in units of the component's own spread. The integers are range coded with distributions that sender
 //! and receiver know, as 16-bit integer frequencies, so that every machine decodes the same numbers. Five components take about
@@ -25,12 +25,14 @@
 //! length field.
 
 mod format;
+mod numbers;
 mod range;
 mod rate;
 mod table;
 mod walk;
 
 pub use format::WireFormat;
+pub use numbers::RoundedMixture;
 pub use rate::{RateControl, Rated};
 
 use crate::Error;

@@ -35,11 +35,8 @@ pub(super) const LONGEST_GAP: u32 = 64;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Bank {
-    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     x: [f32; MODELS],
-    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     v: [f32; MODELS],
-    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     w: [f32; MODELS],
 }
 

@@ -15,14 +15,10 @@ const SLACK: f64 = 1.0 / (1_u64 << 30) as f64;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Lattice {
-    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     anchor: f64,
-    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     step: f64,
-    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     delta: f64,
     /// The period, and its number of points.
-    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     circle: Option<(f64, i64)>,
     decimal: Option<Decimal>,
 }
@@ -33,7 +29,6 @@ pub struct Lattice {
 struct Decimal {
     anchor: i64,
     step: i64,
-    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     ten: f64,
 }
 

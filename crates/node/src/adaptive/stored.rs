@@ -16,11 +16,9 @@ pub(super) struct StoredReplica {
     last: i64,
     before: i64,
     gap: u32,
-    #[serde(with = "fewbits_numerics::stored")]
     predictors: [f32; PREDICTORS],
     residuals: [StoredResiduals; PREDICTORS],
     values: StoredValues,
-    #[serde(with = "fewbits_numerics::stored")]
     coders: [f32; CODERS],
 }
 

@@ -1,11 +1,8 @@
 //! Covariances of Gaussian densities, factored once: Cholesky factor, whitener, determinant.
 
 use crate::error::{ArgumentError, all_finite};
-use crate::linear_algebra::symmetry::agree;
+use crate::linear_algebra::tolerances::{SINGULAR, agree};
 use nalgebra::{SMatrix, SVector};
-
-/// A squared pivot of the correlation matrix below this counts as singular.
-const SINGULAR: f64 = 1e-14;
 
 /// A positive definite covariance `C = L L'` in the form that densities need.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -149,7 +146,8 @@ pub fn half_log_det<const D: usize>(covariance: &SMatrix<f64, D, D>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Matrix2;
+    use crate::linalg::symmetrised;
+    use nalgebra::{Matrix2, Matrix3, Vector3};
 
     #[test]
     fn units_may_differ_by_eighteen_orders() {
@@ -171,6 +169,27 @@ mod tests {
             Matrix2::new(1.0, 1.0, 1.0, 1.0),
         ] {
             assert!(Factored::new("c", &c).is_err(), "{c:?}");
+        }
+    }
+
+    /// Defect: one large entry hid an asymmetry, so that draws and gains used different covariances.
+    #[test]
+    fn definite_matrices_are_judged_by_row_and_column() {
+        let asymmetric = Matrix3::new(1.0, 0.9, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0, 1e10);
+        assert!(Factored::new("m", &asymmetric).is_err());
+        let units = Matrix3::from_diagonal(&Vector3::new(1e-9, 1.0, 1e5));
+        let regular = Matrix3::new(2.0, 0.3, -0.4, 0.3 + 1e-12, 1.1, 0.5, -0.4, 0.5, 1.7);
+        let matrix = units * regular * units;
+        let lower = Factored::new("m", &matrix).unwrap().lower;
+        let (matrix, back) = (symmetrised(&matrix), lower * lower.transpose());
+        assert!((0..9).all(|k| (back[k] - matrix[k]).abs() <= 1e-14 * matrix[k].abs()));
+        for bad in [
+            Matrix3::zeros(),
+            -Matrix3::identity(),
+            Matrix3::from_element(1.0),
+            Matrix3::from_element(f64::NAN),
+        ] {
+            assert!(Factored::new("m", &bad).is_err());
         }
     }
 }

@@ -3,5 +3,5 @@
 pub mod eigen;
 pub mod factored;
 pub mod linalg;
-mod symmetry;
+mod tolerances;
 pub mod tridiagonal;

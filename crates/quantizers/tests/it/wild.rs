@@ -41,7 +41,8 @@ proptest! {
             if let Ok(moved) = q.affine(x[6], x[7]) {
                 prop_assert!(moved.breakpoints().iter().all(|b| b.is_finite()), "{:?}", moved);
             }
-            if let Ok(factor) = q.factor_of(x[5], |_| x[6]) {
+            let channel = Channel::symmetric(q.levels(), x[6]);
+            if let Some(factor) = channel.ok().and_then(|channel| q.factor(count, &channel, x[5]).ok()) {
                 let log = factor.log_likelihood(&[x[4]].into());
                 prop_assert!(!x[4].is_finite() || !log.is_nan(), "{:?} {}", factor, x[4]);
             }

@@ -10,9 +10,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub(super) struct Parts {
     cells: Vec<Weighted>,
-    #[serde(with = "fewbits_numerics::stored")]
     floor: f64,
-    #[serde(with = "fewbits_numerics::stored")]
     log_scale: f64,
     noise: Noise,
 }
@@ -21,7 +19,6 @@ pub(super) struct Parts {
 #[serde(deny_unknown_fields)]
 struct Weighted {
     cell: Cell,
-    #[serde(with = "fewbits_numerics::stored")]
     weight: f64,
 }
 
