@@ -205,7 +205,7 @@ fn vectors_are_lawful() {
     let json = serde_json::to_string(&rule).unwrap();
     assert_eq!(serde_json::from_str::<CensoringRule<2>>(&json).unwrap(), rule);
     assert!(
-        serde_json::from_str::<CensoringRule<2>>(&json.replace("\"threshold\":\"1.0", "\"threshold\":\"-1.0")).is_err()
+        serde_json::from_str::<CensoringRule<2>>(&json.replace("\"threshold\":1.0", "\"threshold\":-1.0")).is_err()
     );
 }
 

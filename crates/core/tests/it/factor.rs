@@ -115,13 +115,13 @@ fn bad_numbers_are_refused_by_name() {
     assert_eq!(serde_json::from_str::<Link>(&serde_json::to_string(&known).unwrap()).unwrap(), known);
     assert!(old.with_erasure(-0.1).is_err() && old.with_erasure(f64::NAN).is_err());
     assert!(serde_json::from_str::<Cell>(r#"{"lower":3,"upper":1}"#).is_err());
-    // One rule for infinities: as text. An end that was left out, as before, is infinite too.
+    // One rule for infinities: as text. An end that is left out is infinite too.
     let above = Cell::new(0.5, f64::INFINITY).unwrap();
-    assert_eq!(serde_json::to_string(&above).unwrap(), r#"{"lower":"0.5","upper":"inf"}"#);
+    assert_eq!(serde_json::to_string(&above).unwrap(), r#"{"lower":0.5,"upper":"inf"}"#);
     for text in [
-        r#"{"lower":"0.5","upper":"inf"}"#,
+        r#"{"lower":0.5,"upper":"inf"}"#,
         r#"{"lower":0.5,"upper":null}"#,
-        r#"{"lower":"0.5"}"#,
+        r#"{"lower":0.5}"#,
     ] {
         assert_eq!(serde_json::from_str::<Cell>(text).unwrap(), above);
     }

@@ -385,9 +385,6 @@ fn a_restored_centre_goes_on_with_the_same_bits() {
     }
     // Stored as text: what the centre knows, and the streams.
     let state = serde_json::to_string(&first.centre.state()).unwrap();
-    // Outside of quotes no float stands, so that no parser of numbers can change a bit.
-    let bare = |text: &str| text.replace("true", "").replace("false", "");
-    assert!(state.split('"').step_by(2).all(|text| !bare(text).contains(['.', 'e'])), "{state}");
     let streams = serde_json::to_string(&(&first.rng, &first.filter_rng)).unwrap();
     // Stored as bytes: less than half, and any other bytes are refused.
     let bytes = first.centre.state().to_bytes().unwrap();
