@@ -83,16 +83,18 @@ impl Task {
     }
 }
 
-/// A noise that changes no design: a thousandth of the prior's deviation, and of the smallest gap between its points if it has points.
+/// A noise that changes no design: a two-hundredth of the prior's deviation, or of points a thousandth of the smallest gap between them.
+/// It moves the breakpoints of a normal prior by a hundred-thousandth of its deviation. The time of a design grows as its reciprocal.
 pub fn negligible(prior: &Prior) -> f64 {
-    let mut points: Vec<f64> = prior.points().map_or(Vec::new(), |(values, _)| values.to_vec());
+    let Some((values, _)) = prior.points() else {
+        return 5e-3 * prior.deviation();
+    };
+    let mut points = values.to_vec();
     points.sort_by(f64::total_cmp);
     let gaps = points.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > 0.0);
-    NEGLIGIBLE * gaps.fold(prior.deviation(), f64::min)
+    1e-3 * gaps.fold(prior.deviation(), f64::min)
 }
 
-/// Share of a length that is negligible beside it.
-const NEGLIGIBLE: f64 = 1e-3;
 /// Number of different values up to which a sample is taken to be points of mass, and how often each must occur on average.
 const MAX_POINTS: usize = 16;
 const MIN_TIMES: usize = 8;
