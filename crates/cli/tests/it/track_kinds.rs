@@ -135,7 +135,11 @@ fn right_silences_are_not_rejected() {
         }
         let (rows, _) = tracked(&table, options);
         let rejected: f64 = rows.iter().map(|row| of(row, "rejected")).sum();
-        let kept = rows.iter().zip(&truth).filter(|(row, level)| held(row, **level)).count();
+        let kept = rows
+            .iter()
+            .zip(&truth)
+            .filter(|(row, level)| held(row, **level))
+            .count();
         // Errors last from one value to the next: some forty are independent, and two standard errors of a share of .95 are .07.
         assert!(rejected <= 4.0 && kept > 880, "{options:?}: {rejected} rejected, {kept} held");
     }
