@@ -6,12 +6,12 @@ use crate::error::Error;
 use crate::input::Table;
 use fewbits_table::Kind as Cells;
 
-/// Names of a column that has the name of each row's sensor. The last four words may be followed by a number in each cell.
+/// Names of a column that has the name of each row's sensor. Anchors may be numbers.
 const LABELS: [&str; 16] = [
     "name", "id", "sensor", "device", "entity", "channel", "source", "label", "mote", "tag", "topic", "uid", "anchor",
     "node", "beacon", "station",
 ];
-/// From this one on, whole numbers are names too, where places are looked for.
+/// From this one on, numbers are names too, where places are looked for.
 const PLACED: usize = 12;
 /// Names of a column of the standard deviations of each row's values.
 const ACCURACIES: [&str; 8] = [
@@ -136,7 +136,8 @@ impl Roles {
                 let words = words(&table.names[**i]);
                 let known = |word: &String| LABELS.iter().position(|label| label == word);
                 let place = words.first().and_then(known);
-                let is_number = table.kind(**i) == Cells::Integer && kind.finds == Finds::Anchors;
+                let is_plain = words.len() == 1 || words.get(1).is_some_and(|word| word == "id");
+                let is_number = is_plain && kind.finds == Finds::Anchors;
                 place.is_some_and(|place| holds_words(table, **i) || (is_number && place >= PLACED))
             };
             let labels: Vec<&String> = free.iter().filter(is_label).map(|i| &table.names[*i]).collect();

@@ -17,6 +17,8 @@ const AT_ENDS: f64 = 0.03;
 const NEARLY: f64 = 0.8;
 /// Values between which silence is looked at, at least, and share of empty cells.
 const FEWEST: usize = 3;
+/// Values that are all 0 or 1, at least, of which is told that they may be bits.
+const FEWEST_BITS: usize = 30;
 /// The same of a table of single reports, in which silence is not seen.
 const FEWEST_ROWS: usize = 10;
 const EMPTY: f64 = 0.5;
@@ -49,6 +51,13 @@ pub(super) fn hints(
         let values: Vec<f64> = cells.iter().copied().flatten().collect();
         let steps: Vec<f64> = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
         let is_long = options.table.by.is_some();
+        let is_bit = |value: &f64| *value == 0.0 || *value == 1.0;
+        if values.len() >= FEWEST_BITS && values.iter().all(is_bit) && values.contains(&0.0) && values.contains(&1.0) {
+            lines.push(format!(
+                "{name} is 0 or 1 throughout: if it tells whether the level is above a threshold, say --reports --send bit and --threshold or \
+                 --threshold-column; without it these estimates are of another thing"
+            ));
+        }
         let silent = (cells.len() - values.len()) as f64;
         let least = steps.iter().fold(f64::INFINITY, |least, step| least.min(*step));
         let typical = median(steps.clone());

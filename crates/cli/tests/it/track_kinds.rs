@@ -162,3 +162,29 @@ fn numbers_of_any_unit_are_printed() {
     let page = text(&good(folder.path(), &words, sample.as_bytes()));
     assert!(!page.contains("-0.000") && !page.contains("inf %") && page.contains("e-7"), "{page}");
 }
+
+/// Defect: a column of numbers of anchors was taken for an anchor without `--by`, and bits for values without a word.
+#[test]
+fn anchors_by_number_are_found_and_bits_are_told() {
+    let mut numbers = Numbers(618);
+    let places = [(0.0, 0.0), (9.0, 0.0), (9.0, 6.0), (0.0, 6.0)];
+    let (mut anchors, mut ranges, mut bits) =
+        ("id,x,y\n".to_owned(), "t_s,anchor,range_m\n".to_owned(), "t,b\n".to_owned());
+    for (i, (x, y)) in places.iter().enumerate() {
+        anchors += &format!("{i},{x},{y}\n");
+    }
+    for row in 0..400 {
+        let (x, y) = places[row % 4];
+        let range = f64::hypot(x - 3.0, y - 2.0) + 0.05 * numbers.normal();
+        ranges += &format!("{},{},{range}\n", 0.1 * row as f64, row % 4);
+        bits += &format!("{row},{}\n", u8::from(numbers.normal() > 0.0));
+    }
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("anchors.csv"), anchors).unwrap();
+    let words = ["ranges", "-", "--anchors", "anchors.csv"];
+    let found = text(&good(folder.path(), &words, ranges.as_bytes()));
+    let stated = text(&good(folder.path(), &[&words[..], &["--by", "anchor"]].concat(), ranges.as_bytes()));
+    assert_eq!(found, stated);
+    let (_, summary) = tracked(&bits, &[]);
+    assert!(has_hint(&summary, "--reports --send bit"), "{summary}");
+}
