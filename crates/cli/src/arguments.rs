@@ -264,7 +264,8 @@ pub(crate) struct TrackOptions {
     #[arg(long, value_name = "WIDTH[/TIME]")]
     pub(crate) silent_within: Option<String>,
     /// Detection limits, as `0.25..` or `0.25..40`: a value at or beyond a limit says only that the measurement is beyond it.
-    #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true)]
+    /// `no`: there are none. Default: found, if many values are equal at an end where others hardly ever are, and it is not 0.
+    #[arg(long, value_name = "LOW..HIGH|no", allow_hyphen_values = true)]
     pub(crate) limits: Option<String>,
     /// Standard deviation of the measurement noise in the unit of the column, as `0.3` or `column=0.3,*=0.5`. Default: estimated from the
     /// first 200 rows. With `--model ranges` as in the task `ranges`.

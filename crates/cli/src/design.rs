@@ -5,7 +5,7 @@ use crate::arguments::{DialectOptions, TableOptions};
 use crate::design_options::{Criterion, DesignOptions, Form};
 use crate::error::Error;
 use crate::input::Table;
-use crate::numbers::short;
+use crate::numbers::{column, short};
 use crate::output;
 use crate::plot::{Layer, Picture};
 use crate::say::say;
@@ -69,11 +69,11 @@ fn sample(options: &DesignOptions, file: &str) -> Result<Prior, Error> {
     let prior = design::prior_of(&values).map_err(option)?;
     if let Some(fit) = prior.sample_fit() {
         say!(
-            "sample of {}: mean {:.6} ({:.2e}), deviation {:.6} ({:.2e}; standard errors)",
+            "sample of {}: mean {} ({:.2e}), deviation {} ({:.2e}; standard errors)",
             values.len(),
-            prior.mean(),
+            column(prior.mean()),
             fit.mean_standard_error,
-            prior.deviation(),
+            column(prior.deviation()),
             fit.deviation_standard_error
         );
     }
@@ -159,7 +159,7 @@ fn written(options: &DesignOptions, solution: &Solution, rounded: Option<&Rounde
         let mut text = rounded.map_or(solution, |rounded| &rounded.solution).table();
         if let Some(rounded) = rounded {
             // Writing to a string cannot fail.
-            let _ = writeln!(text, "before rounding to the converter: {:.9}", solution.value);
+            let _ = writeln!(text, "before rounding to the converter: {}", column(solution.value));
             for (sensor, codes) in rounded.solution.sensors().iter().zip(&rounded.thresholds) {
                 let codes: Vec<String> = codes.iter().map(u32::to_string).collect();
                 let _ = writeln!(text, "sensor {}: thresholds in codes {}", sensor.sensor, codes.join(", "));

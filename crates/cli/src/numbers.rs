@@ -45,6 +45,15 @@ pub(crate) fn exact(number: f64) -> String {
     }
 }
 
+/// A number of a column of a table: six decimals, or six digits and an exponent where decimals would hide it.
+pub(crate) fn column(number: f64) -> String {
+    if number == 0.0 || (1e-3..1e6).contains(&number.abs()) {
+        format!("{number:.6}")
+    } else {
+        format!("{number:.5e}")
+    }
+}
+
 /// A number with at most four digits, for sizes in messages.
 pub(crate) fn short(number: f64) -> String {
     if number == 0.0 || (1e-4..1e7).contains(&number.abs()) {

@@ -108,6 +108,18 @@ fn tested(bits: &BitString) -> Option<ReportTest> {
     })
 }
 
+/// The same of a sensor that sends on change. Its values come because they are far from the last, so that of right ones too many are on one
+/// side and few are near the forecast. Only an improbable one is tested: it stands for a narrow cell about it.
+fn tested_on_change(bits: &BitString) -> Option<ReportTest> {
+    Some(match tested(bits)? {
+        ReportTest::Value(variance) => ReportTest::Cell(NARROW * variance.sqrt()),
+        cell => cell,
+    })
+}
+
+/// Width of a narrow cell, in deviations.
+const NARROW: f64 = 1e-6;
+
 struct Member {
     seat: Seat,
     node: Box<dyn SensorNode<1>>,
@@ -135,6 +147,15 @@ fn moments<const D: usize>(belief: &Gaussian<D>, zero: f64) -> Vec<(f64, f64)> {
         if i == 0 { own.hypot(zero) } else { own }
     };
     (0..D).map(|i| (belief.mean()[i], deviation(i))).collect()
+}
+
+/// Of angles that differ by whole periods, the one nearest to the prediction. Other values keep every bit: one at a detection limit is no
+/// longer at it after rounding.
+fn nearest(cell: f64, expected: f64, period: Option<f64>) -> f64 {
+    match period {
+        None => cell,
+        Some(_) => expected + calibration::wrapped(cell - expected, period),
+    }
 }
 
 impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
@@ -173,10 +194,8 @@ impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
         let member = &mut self.members[sensor];
         if member.seat.is_stated() {
             let expected = self.centre.estimate().mean()[0];
-            let cell = cell.filter(|cell| cell.is_finite()).map(|cell| {
-                let cell = cell - member.seat.offset;
-                expected + calibration::wrapped(cell - expected, self.period)
-            });
+            let cell = cell.filter(|cell| cell.is_finite());
+            let cell = cell.map(|cell| nearest(cell - member.seat.offset, expected, self.period));
             let reading = member.seat.reading(cell, said, member.last);
             member.last = cell.or(member.last);
             let bits = reading
@@ -196,10 +215,8 @@ impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
                 Some(sensors::bits(member.seat.sends, cell)?)
             }
             Some(cell) => {
-                // Of angles that differ by whole periods, the one nearest to the prediction.
                 let expected = self.centre.estimate().mean()[0];
-                let cell = cell - member.seat.offset;
-                let cell = expected + calibration::wrapped(cell - expected, self.period);
+                let cell = nearest(cell - member.seat.offset, expected, self.period);
                 let measurement = Vector1::new(cell);
                 member.node.report(&mut self.rng, &measurement, &feedback)?
             }
@@ -224,7 +241,11 @@ impl<const D: usize, F: StateFilter<D>> Estimator for Centre<D, F> {
             let nothing = |_: &Gaussian<D>, _: &Gaussian<1>| ();
             let remote = Reporting::new(sensing, Stating::new(usual)?, link, nothing)
                 .sending_values()
-                .testing(tested);
+                .testing(if seat.meaning.silent_within.is_some() {
+                    tested_on_change
+                } else {
+                    tested
+                });
             self.centre.join_boxed(number, Box::new(remote))?;
         } else {
             self.centre.join_boxed(number, sends.remote::<D>(0, variance, link)?)?;

@@ -1,14 +1,16 @@
 //! The task `fit`: calibration from a whole table.
 
 use super::applied::{Found, Sensor};
+use super::columns::Kind;
 use super::first::values_of;
-use super::rows::{Instant, Instants, Kind, Said};
+use super::rows::{Instant, Instants, Said};
 use crate::Ending;
 use crate::bounds::PerColumn;
 use crate::error::Error;
 use crate::fit_options::{FitOptions, Sought};
-use crate::numbers::above_zero;
+use crate::numbers::{above_zero, column};
 use crate::output;
+use crate::say::say;
 use fewbits_filters::calibration::{self, Reading};
 use fewbits_filters::fit::{Fit, Quantity, Request, fit};
 use fewbits_recipes::rounding;
@@ -25,6 +27,7 @@ pub(crate) fn run(options: &FitOptions) -> Result<Ending, Error> {
     while let Some(instant) = instants.next()? {
         rows.push(instant);
     }
+    instants.roles.told.iter().for_each(|line| say!("{line}"));
     let names = instants.names.clone();
     let at = |option: &str, name: &String| {
         let place = names.iter().position(|known| known == name);
@@ -212,11 +215,11 @@ fn page(found: &Fit, names: &[String], (bits, steps): (&[usize], &[Option<f64>])
             Quantity::Bias(sensor) if bits.contains(&sensor) => (format!("threshold of {}", names[sensor]), -one.value),
             quantity => (title(quantity, names), one.value),
         };
-        text += &format!("{name:<50} {value:>13.6} {:>13.6}\n", one.standard_error);
+        text += &format!("{name:<50} {:>13} {:>13}\n", column(value), column(one.standard_error));
     }
     for one in &found.correlations {
         let name = format!("correlation of {} and {}", names[one.sensors.0], names[one.sensors.1]);
-        text += &format!("{name:<50} {:>13.6} {:>13.6}\n", one.value, one.standard_error);
+        text += &format!("{name:<50} {:>13} {:>13}\n", column(one.value), column(one.standard_error));
     }
     text.push('\n');
     for one in &found.refused {

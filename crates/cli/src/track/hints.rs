@@ -3,6 +3,7 @@
 use super::first::{values as first_values, values_of};
 use super::rows::Instant;
 use crate::arguments::TrackOptions;
+use crate::numbers::short;
 use fewbits_filters::calibration::{median, offsets};
 
 /// Periods of angles and their like.
@@ -16,6 +17,8 @@ const AT_ENDS: f64 = 0.03;
 const NEARLY: f64 = 0.8;
 /// Values between which silence is looked at, at least, and share of empty cells.
 const FEWEST: usize = 3;
+/// Values that are all 0 or 1, at least, of which is told that they may be bits.
+const FEWEST_BITS: usize = 30;
 /// The same of a table of single reports, in which silence is not seen.
 const FEWEST_ROWS: usize = 10;
 const EMPTY: f64 = 0.5;
@@ -23,11 +26,6 @@ const EMPTY: f64 = 0.5;
 const IRREGULAR: f64 = 3.0;
 /// An offset is told if it is this many of the sensor's deviations.
 const LARGE: f64 = 1.0;
-
-/// Values of which a detection limit is told, at least; a limit has one in so many of them, and more than so many times as many as any other value.
-const FEWEST_AT_LIMIT: usize = 30;
-const SHARE_AT_LIMIT: usize = 20;
-const MORE_AT_LIMIT: usize = 5;
 
 /// Hints, a line each.
 /// `noises` and `offsets`: of each sensor. `has_slope`: a slope explains the first rows far better.
@@ -53,6 +51,13 @@ pub(super) fn hints(
         let values: Vec<f64> = cells.iter().copied().flatten().collect();
         let steps: Vec<f64> = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
         let is_long = options.table.by.is_some();
+        let is_bit = |value: &f64| *value == 0.0 || *value == 1.0;
+        if values.len() >= FEWEST_BITS && values.iter().all(is_bit) && values.contains(&0.0) && values.contains(&1.0) {
+            lines.push(format!(
+                "{name} is 0 or 1 throughout: if it tells whether the level is above a threshold, say --reports --send bit and --threshold or \
+                 --threshold-column; without it these estimates are of another thing"
+            ));
+        }
         let silent = (cells.len() - values.len()) as f64;
         let least = steps.iter().fold(f64::INFINITY, |least, step| least.min(*step));
         let typical = median(steps.clone());
@@ -66,14 +71,14 @@ pub(super) fn hints(
             && least > 0.5 * typical
         {
             lines.push(format!(
-                "{name} has values in {} of {} cells, each at least {least:.3} from the one before: if it sends on change, say \
-                 --silent-within {least:.3}; without it the bands are wrong",
+                "{name} has values in {1} of {2} cells, each at least {0} from the one before: if it sends on change, say \
+                 --silent-within {0}; without it the bands are wrong",
+                short(least),
                 values.len(),
                 cells.len()
             ));
         }
     }
-    lines.extend((0..names.len()).filter_map(|sensor| limit(options, &values_of(first, sensor), &names[sensor])));
     if options.align.is_none() && options.period.is_none() {
         lines.extend(apart(first, names));
     }
@@ -81,8 +86,9 @@ pub(super) fn hints(
     if names.len() == 2 && aligned.iter().enumerate().any(large) {
         let apart = (aligned[0] - aligned[1]).abs();
         lines.push(format!(
-            "the two sensors are {apart:.3} apart, and nothing says which is right: the level is taken to be in the middle, and may be {:.3} off",
-            0.5 * apart
+            "the two sensors are {} apart, and nothing says which is right: the level is taken to be in the middle, and may be {} off",
+            short(apart),
+            short(0.5 * apart)
         ));
     }
     if has_slope {
@@ -93,33 +99,6 @@ pub(super) fn hints(
         lines.push(format!("the first rows have a slope: {what}"));
     }
     lines
-}
-
-/// A value at an end of all values that many cells have, where others are hardly ever equal: a detection limit.
-fn limit(options: &TrackOptions, values: &[f64], name: &str) -> Option<String> {
-    if options.limits.is_some() || values.len() < FEWEST_AT_LIMIT {
-        return None;
-    }
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let (low, high) = (*sorted.first()?, *sorted.last()?);
-    let equal = |to: f64| values.iter().filter(|value| **value == to).count();
-    let runs = sorted.chunk_by(|one, other| one == other);
-    let most = runs
-        .filter(|run| run[0] != low && run[0] != high)
-        .map(<[f64]>::len)
-        .max()
-        .unwrap_or(0);
-    let is_limit = |count: usize| count * SHARE_AT_LIMIT >= values.len() && count > MORE_AT_LIMIT * most.max(1);
-    let (ends, many) = match (is_limit(equal(low)), is_limit(equal(high))) {
-        (true, true) if low < high => (format!("{low}..{high}"), equal(low) + equal(high)),
-        (true, false) => (format!("{low}.."), equal(low)),
-        (false, true) => (format!("..{high}"), equal(high)),
-        _ => return None,
-    };
-    Some(format!(
-        "{name} has {many} values at the end of its range: if it is a detection limit, say --limits {ends}; without it the bands are wrong"
-    ))
 }
 
 /// Sensors of constant offset from the others.
@@ -134,7 +113,7 @@ fn apart(first: &[Instant], names: &[String]) -> Option<String> {
     };
     let apart: Vec<String> = (0..names.len())
         .filter(is_apart)
-        .map(|sensor| format!("{} by {:.3}", names[sensor], found[sensor]))
+        .map(|sensor| format!("{} by {}", names[sensor], short(found[sensor])))
         .collect();
     (!apart.is_empty()).then(|| {
         format!(

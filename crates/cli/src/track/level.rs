@@ -71,6 +71,7 @@ impl Run {
                 difference_from_full_values: None,
                 sensors: Vec::new(),
                 events: Vec::new(),
+                is_silence_said: settings.meaning.silent_within.is_some(),
                 hints: settings.hints.clone(),
             },
             settings,

@@ -2,7 +2,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `rows` | the table as instants |
+//! | `rows`, `columns` | the table as instants, which of its columns are no sensors |
 //! | `sensors` | reports as options and tables have them |
 //! | `centre` | the centre of a level |
 //! | `meaning` | what the cells of a sensor mean |
@@ -10,6 +10,7 @@
 //! | `first` | values of the first rows |
 //! | `found` | what is found from the first rows |
 //! | `hints` | what the first rows suggest that no option says |
+//! | `limits` | detection limits |
 //! | `late` | rows that come late |
 //! | `rhythm` | silence in a table of single reports |
 //! | `report` | first cell of a row, summary |
@@ -23,6 +24,7 @@
 mod anchors;
 mod applied;
 mod centre;
+mod columns;
 mod first;
 mod fit;
 mod found;
@@ -30,6 +32,7 @@ mod height;
 mod hints;
 mod late;
 mod level;
+mod limits;
 mod meaning;
 mod odometry;
 mod path;
@@ -46,7 +49,8 @@ mod world;
 use crate::Ending;
 use crate::arguments::{FitOptions, Model, RangesOptions, TrackOptions};
 use crate::error::Error;
-use rows::{Instants, Kind};
+use columns::{Finds, Kind};
+use rows::Instants;
 
 /// Runs the task.
 pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {
@@ -58,7 +62,10 @@ pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {
         }),
         _ => {
             let instants = Instants::open(&options.table, &Kind::of(options)?)?;
-            let (options, corrections) = applied::applied(options, &instants.names)?;
+            let mut options = options.clone();
+            options.table.by.clone_from(&instants.roles.by);
+            options.accuracy_column.clone_from(&instants.roles.accuracy);
+            let (options, corrections) = applied::applied(&options, &instants.names)?;
             level::run(&options, instants.corrected(corrections))
         }
     }
@@ -72,6 +79,7 @@ pub(crate) fn fit(options: &FitOptions) -> Result<Ending, Error> {
 /// Runs the task `ranges`.
 pub(crate) fn ranges(options: &RangesOptions) -> Result<Ending, Error> {
     let kind = Kind {
+        finds: Finds::Anchors,
         by: options.table.by.clone(),
         late: options.late.map_or(0.0, |late| late.as_secs_f64()),
         ..Kind::default()
@@ -80,5 +88,8 @@ pub(crate) fn ranges(options: &RangesOptions) -> Result<Ending, Error> {
     if table.by.is_none() && !table.columns.is_empty() {
         table.columns.extend(options.odometry.iter().cloned());
     }
-    ranges::run(options, Instants::open(&table, &kind)?)
+    let instants = Instants::open(&table, &kind)?;
+    let mut options = options.clone();
+    options.table.by.clone_from(&instants.roles.by);
+    ranges::run(&options, instants)
 }

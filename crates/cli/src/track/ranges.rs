@@ -140,7 +140,7 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
     };
     let refused = Error::refused("the tracker of ranges is refused");
     let mut settings = settings(options)?;
-    let mut hints = Vec::new();
+    let mut hints = instants.roles.told.clone();
     let is_flat = anchors.iter().all(|(_, place)| place.z == 0.0);
     if let Some(height) = height_found(options, &anchors, settings, &mut instants)? {
         settings.height = Height::Known(height);

@@ -1,10 +1,10 @@
 //! Conversion of rows of a table to instants: what each sensor reported at one time.
 
 use super::applied::Correction;
+use super::columns::{Kind, Roles};
 use super::late::Late;
-use super::meaning::silence;
 use super::samples::Samples;
-use crate::arguments::{TableOptions, TrackOptions};
+use crate::arguments::TableOptions;
 use crate::clock;
 use crate::error::Error;
 use crate::input::Table;
@@ -18,41 +18,6 @@ const PARTS_OF_A_SECOND: [(f64, f64); 3] = [(1e17, 1e9), (1e14, 1e6), (4e9, 1e3)
 
 /// Index of each sensor, and what it reported; `None` if the cell is empty.
 type Reports = Vec<(usize, Option<f64>)>;
-
-/// Which columns of a table are no sensors.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Kind {
-    /// Names of the sensors, if each row is one report.
-    pub(super) by: Option<String>,
-    /// Standard deviations of the row's values.
-    pub(super) accuracy: Option<String>,
-    /// Thresholds of the row's bits.
-    pub(super) threshold: Option<String>,
-    /// Whether a sensor that does not report at an instant says something by that.
-    pub(super) is_filled: bool,
-    /// Seconds by which a row may be late.
-    pub(super) late: f64,
-    /// Seconds between measurements of a sensor that sends some of them.
-    pub(super) sampled: Option<f64>,
-}
-
-impl Kind {
-    pub(super) fn of(options: &TrackOptions) -> Result<Self, Error> {
-        let silent = options.silent_within.as_deref().map(silence).transpose()?;
-        Ok(Self {
-            sampled: silent.and_then(|(_, seconds)| seconds),
-            by: options.table.by.clone(),
-            accuracy: options.accuracy_column.clone(),
-            threshold: options.threshold_column.clone(),
-            is_filled: options.silent_within.is_some(),
-            late: options.late.map_or(0.0, |late| late.as_secs_f64()),
-        })
-    }
-
-    fn columns(&self) -> impl Iterator<Item = &String> {
-        self.accuracy.iter().chain(&self.threshold)
-    }
-}
 
 /// What a row says of its own reports.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -85,6 +50,8 @@ pub(super) struct Instants {
     table: Table,
     base: TimeBase,
     is_long: bool,
+    /// What was found of its columns.
+    pub(super) roles: Roles,
     /// Whether a sensor that does not report at an instant has an empty cell there, though each row is a report.
     pub(super) is_filled: bool,
     /// Whether cells may be limits, as `<0.25`.
@@ -129,7 +96,8 @@ impl Instants {
         };
         let mut table = Table::open(&chosen)?;
         table.find_time(2)?;
-        if let Some(name) = &kind.by {
+        let roles = Roles::find(&table, kind, chosen.columns.is_empty());
+        if let Some(name) = &roles.by {
             table = table.with_labels(name)?;
         }
         let place = |name: &Option<String>| match name {
@@ -142,7 +110,7 @@ impl Instants {
                 }
             },
         };
-        let own = [place(&kind.accuracy)?, place(&kind.threshold)?];
+        let own = [place(&roles.accuracy)?, place(&kind.threshold)?];
         let sensors: Vec<String> = table
             .names
             .iter()
@@ -150,7 +118,7 @@ impl Instants {
             .filter(|(i, _)| !own.contains(&Some(*i)))
             .map(|(_, name)| name.clone())
             .collect();
-        if kind.by.is_some() && sensors.len() != 1 {
+        if roles.by.is_some() && sensors.len() != 1 {
             let names = sensors.join(", ");
             let expected = "one column of values is expected beside time and --by, name it with --columns";
             return Err(Error::content(table.file(), format_args!("columns {names}: {expected}")));
@@ -159,6 +127,9 @@ impl Instants {
             return Err(Error::empty(table.file(), "columns of values"));
         }
         let has_limits = table.take_limits();
+        if let Some(hint) = roles.hint(&table) {
+            return Err(Error::content(table.file(), hint));
+        }
         table.require_numbers()?;
         let base = table.time_base(&table_options, None)?;
         if table.is_at_end()? {
@@ -169,8 +140,9 @@ impl Instants {
             _ => 1.0,
         };
         Ok(Self {
-            names: if kind.by.is_some() { Vec::new() } else { sensors },
-            is_long: kind.by.is_some(),
+            names: if roles.by.is_some() { Vec::new() } else { sensors },
+            is_long: roles.by.is_some(),
+            roles,
             has_limits,
             is_filled: kind.is_filled,
             own,

@@ -2,6 +2,7 @@
 
 use super::first::{values, values_of};
 use super::hints::{circle, hints};
+use super::limits::{self, limits};
 use super::meaning::{Meaning, Seat, silence};
 use super::report::Circle;
 use super::rows::{Instant, Instants};
@@ -42,6 +43,8 @@ pub(super) struct Settings {
     losses: Vec<f64>,
     pub(super) offsets: Vec<f64>,
     pub(super) meaning: Meaning,
+    /// Detection limits that are found from the first rows: of each sensor.
+    limits: Vec<limits::Ends>,
     /// Step of rounding, if it is found from the first rows: of each sensor.
     pub(super) steps: Vec<Option<f64>>,
     /// Whether a model with a slope explains the first rows far better.
@@ -68,20 +71,6 @@ fn values_in<'a>(first: impl IntoIterator<Item = &'a Instant>) -> usize {
         counts[*sensor] += 1;
     }
     counts.into_iter().max().unwrap_or(0)
-}
-
-/// Parses `0.25..`, `..40` or `0.25..40`.
-fn limits(text: &str) -> Result<(Option<f64>, Option<f64>), Error> {
-    const EXPECTED: &str = "a lower limit, an upper one, or both, as `0.25..`, `..40` or `0.25..40`";
-    let (low, high) = text
-        .split_once("..")
-        .ok_or_else(|| Error::option("--limits", text, EXPECTED))?;
-    let end = |end: &str| {
-        (!end.trim().is_empty())
-            .then(|| number("--limits", end, EXPECTED))
-            .transpose()
-    };
-    Ok((end(low)?, end(high)?))
 }
 
 /// Parses `0.5/1h`. Numbered rows are one second apart.
@@ -148,7 +137,7 @@ impl Settings {
         }
         let sensors = instants.names.len();
         let has_negative = (0..sensors).any(|sensor| values_of(&first, sensor).iter().any(|value| *value < 0.0));
-        let mut told = Vec::new();
+        let mut told = instants.roles.told.clone();
         let period = match options.period.as_deref() {
             Some("no") => None,
             Some(text) => Some(above_zero("--period", text, "a period above 0, as 360, or `no`")?),
@@ -181,7 +170,15 @@ impl Settings {
             .map(silence)
             .transpose()?
             .map(|(width, _)| width);
+        let found_limits = if options.limits.is_some() || options.reports || instants.has_limits {
+            Vec::new()
+        } else {
+            (0..sensors)
+                .map(|sensor| limits::found(&values_of(&first, sensor), &instants.names[sensor], &mut told))
+                .collect()
+        };
         let mut settings = Self {
+            limits: found_limits,
             steps: Vec::new(),
             has_slope: false,
             hints: told,
@@ -304,6 +301,7 @@ impl Settings {
             offset: self.offsets.get(sensor).copied().unwrap_or(0.0),
             meaning: Meaning {
                 step: self.step_of(sensor),
+                limits: self.limits.get(sensor).copied().unwrap_or(self.meaning.limits),
                 ..self.meaning
             },
         }

@@ -24,6 +24,9 @@ pub(super) struct Summary {
     pub(super) difference_from_full_values: Option<f64>,
     pub(super) sensors: Vec<SensorSummary>,
     pub(super) events: Vec<EventSummary>,
+    /// Whether an empty cell says something of the level.
+    #[serde(skip)]
+    pub(super) is_silence_said: bool,
     /// What the first rows suggest that no option says.
     pub(super) hints: Vec<String>,
 }
@@ -87,7 +90,8 @@ pub(super) fn lines(summary: &Summary) -> Vec<String> {
         ),
     ];
     if let Some(difference) = summary.difference_from_full_values {
-        lines.push(format!("estimates differ by {difference:.4} (root mean square) from those of values in full"));
+        lines
+            .push(format!("estimates differ by {} (root mean square) from those of values in full", short(difference)));
     }
     lines.extend(summary.hints.iter().cloned());
     if summary.copies > 0 {
@@ -95,8 +99,11 @@ pub(super) fn lines(summary: &Summary) -> Vec<String> {
     }
     for sensor in summary.sensors.iter().filter(|sensor| sensor.rejected > 0) {
         lines.push(format!(
-            "{}: {} of {} reports were too unlikely and not used",
-            sensor.name, sensor.rejected, sensor.reports
+            "{}: {} of {} reports{} were too unlikely and not used",
+            sensor.name,
+            sensor.rejected,
+            sensor.reports + if summary.is_silence_said { sensor.gaps } else { 0 },
+            if summary.is_silence_said { " and silences" } else { "" }
         ));
     }
     for sensor in summary.sensors.iter().filter(|sensor| !sensor.used) {

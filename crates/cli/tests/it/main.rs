@@ -26,6 +26,7 @@ mod tables;
 mod track;
 mod track_faults;
 mod track_found;
+mod track_kinds;
 mod track_meanings;
 mod track_random;
 

@@ -5,7 +5,7 @@ use crate::{fewbits, text};
 use serde_json::Value;
 
 /// Rows of the estimates, and the summary.
-fn tracked(table: &str, options: &[&str]) -> (Vec<Value>, Value) {
+pub(super) fn tracked(table: &str, options: &[&str]) -> (Vec<Value>, Value) {
     let folder = tempfile::tempdir().unwrap();
     let words = [&["track", "-", "--json"], options].concat();
     let output = fewbits(folder.path(), &words, table.as_bytes());
@@ -16,15 +16,15 @@ fn tracked(table: &str, options: &[&str]) -> (Vec<Value>, Value) {
     (rows, serde_json::from_str(errors.lines().last().unwrap()).unwrap())
 }
 
-fn of(row: &Value, name: &str) -> f64 {
+pub(super) fn of(row: &Value, name: &str) -> f64 {
     row[name].as_f64().unwrap_or(f64::NAN)
 }
 
-fn held(row: &Value, truth: f64) -> bool {
+pub(super) fn held(row: &Value, truth: f64) -> bool {
     (of(row, "level_low")..=of(row, "level_high")).contains(&truth)
 }
 
-fn has_hint(summary: &Value, part: &str) -> bool {
+pub(super) fn has_hint(summary: &Value, part: &str) -> bool {
     let hints = summary["hints"].as_array().unwrap();
     hints.iter().any(|hint| hint.as_str().unwrap().contains(part))
 }
@@ -179,8 +179,9 @@ fn single_reports(seed: u64) -> (String, Vec<f64>) {
 }
 
 /// Defect: of a sensor that sends on change, rows that are not there said nothing in a table of single reports. Where it is said how often the
-/// sensors measure, what they did not send counts at the times at which they did not, and the bands hold what they say. Squared errors
-/// are not compared: now and then a right value is rejected as wild, and its row is far off.
+/// sensors measure, what they did not send counts at the times at which they did not, and the bands hold what they say.
+///
+/// Defect: values that come because they are far from the last were tested as if they came whatever they are; right sensors were excluded.
 #[test]
 fn silence_between_single_reports_says_something() {
     let (mut squared, mut kept) = ([0.0_f64; 3], [0_usize; 3]);
@@ -201,7 +202,7 @@ fn silence_between_single_reports_says_something() {
         }
     }
     println!("squared errors {squared:?}, {kept:?} of {count} held");
-    assert!(squared[1] < squared[0] && kept[1] > kept[0], "{squared:?} {kept:?} of {count}");
+    assert!(squared[1] < squared[0] && squared[2] < squared[0], "{squared:?} {kept:?} of {count}");
     let share = kept[2] as f64 / count as f64;
     assert!((0.92..=0.98).contains(&share), "{squared:?} {kept:?} of {count}");
 }

@@ -300,7 +300,8 @@ impl<L: Fn(f64, &[f64]) -> f64> Search<'_, L> {
             Number::Unknown { least, .. } if *least > 0.0 => self.shifts[axis] - (least / number.start()).ln(),
             _ => FAR_BELOW,
         };
-        let down = FAR_BELOW.min(room);
+        // Nor out of the reach of the search, where it ends if the number hardly matters.
+        let down = FAR_BELOW.min(room).min(REACH + self.shifts[axis]);
         let here = self.at(&self.shifts);
         // At the least number it is as small as it may be.
         let is_flat = down < RAISED || self.at(&moved(-down)) >= here - AS_HIGH * down / FAR_BELOW;

@@ -7,7 +7,6 @@ use super::{FusionCentre, Member};
 use crate::Error;
 use crate::contract::{Points, StateFilter};
 use fewbits_core::{BitString, Evidence, Gaussian, Observation};
-use fewbits_numerics::normal::{cdf, quantile};
 use nalgebra::SVector;
 
 /// What is known before the reports of an instant.
@@ -19,9 +18,6 @@ pub(super) enum Law<const D: usize> {
     /// Gaussians and the logarithms of their weights. Sensing is linearised at the mean of each.
     Mixture(Vec<(f64, Gaussian<D>)>),
 }
-
-/// Smallest probability of a tail whose residual is still told from others.
-const TAIL: f64 = 1e-300;
 
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// Each of these reports tested given the others.
@@ -177,10 +173,8 @@ impl<const D: usize> Member<D> {
         }
         let known = |i: usize| Gaussian::known(points.point(i)).ok();
         if self.sensor.value_variance(&known(0)?).is_some() {
-            let variances: Option<Vec<f64>> = (0..weights.len())
-                .map(|i| self.sensor.value_variance(&known(i)?))
-                .collect();
-            return self.residual_of_value(&variances?, weights, measured, logs);
+            let beliefs: Vec<Gaussian<D>> = (0..weights.len()).map(known).collect::<Option<_>>()?;
+            return self.residual_of_report(reading, &beliefs, weights, measured, (logs, measured));
         }
         if bits == 0 || bits > WORD_BITS {
             return None;
@@ -209,41 +203,6 @@ impl<const D: usize> Member<D> {
             }
         }
         Residual::of_word(&found, at)
-    }
-
-    /// The residual of a value by its probability integral: `P(value <= received)` is uniform if the law is right.
-    fn residual_of_value(
-        &self,
-        variances: &[f64],
-        weights: &[f64],
-        measured: &[f64],
-        logs: &[f64],
-    ) -> Option<Residual> {
-        let arrival = self.arrival.ln();
-        let distance = |i: usize| {
-            let nis = -2.0 * (logs[i] - arrival) - (std::f64::consts::TAU * variances[i]).ln();
-            (nis.max(0.0) * variances[i]).sqrt()
-        };
-        // The value is this far above or below what one point expects; a second point tells which.
-        let near = (0..logs.len()).max_by(|i, j| logs[*i].total_cmp(&logs[*j]))?;
-        let far = (0..logs.len()).max_by(|i, j| {
-            let off = |i: &usize| (measured[*i] - measured[near]).abs() / variances[*i].sqrt();
-            off(i).total_cmp(&off(j))
-        })?;
-        let misfit = |value: f64| ((value - measured[far]).abs() - distance(far)).abs();
-        let (above, below) = (measured[near] + distance(near), measured[near] - distance(near));
-        let value = if misfit(above) <= misfit(below) { above } else { below };
-        let (mut lower, mut upper) = (0.0, 0.0);
-        for ((weight, mean), variance) in weights.iter().zip(measured).zip(variances) {
-            let standard = (value - mean) / variance.sqrt();
-            lower += weight * cdf(standard);
-            upper += weight * cdf(-standard);
-        }
-        Residual::of_normal(if lower < upper {
-            quantile(lower.max(TAIL))
-        } else {
-            -quantile(upper.max(TAIL))
-        })
     }
 
     fn test_by_mixture(&self, reading: &Reading<'_, D>, modes: &[(f64, Gaussian<D>)]) -> Tested {
@@ -298,10 +257,15 @@ impl<const D: usize> Member<D> {
             let (log, correction) = place(found);
             return Residual::of_bit((log.exp() / self.arrival).min(1.0), correction);
         }
-        let variances = modes.iter().map(|(_, mode)| self.sensor.value_variance(mode));
-        if let Some(variances) = variances.collect::<Option<Vec<f64>>>() {
+        if modes.iter().all(|(_, mode)| self.sensor.value_variance(mode).is_some()) {
             let logs: Vec<f64> = found.iter().map(|(log, _)| *log).collect();
-            return self.residual_of_value(&variances, weights, &measured, &logs);
+            let after: Vec<f64> = measured
+                .iter()
+                .zip(found)
+                .map(|(h, (_, correction))| h + correction)
+                .collect();
+            let beliefs: Vec<Gaussian<D>> = modes.iter().map(|(_, mode)| *mode).collect();
+            return self.residual_of_report(reading, &beliefs, weights, &measured, (&logs, &after));
         }
         if received.bits() == 0 || received.bits() > WORD_BITS {
             return None;

@@ -24,6 +24,7 @@
 //!
 //! Not in this module: radio, addresses, frames; the scheme of any single paper.
 
+mod by_value;
 mod gate;
 mod health;
 mod judge;

@@ -128,7 +128,8 @@ impl Solution {
         });
         let sensors: Vec<SensorDesign> = sensors.collect();
         Ok(Self {
-            value: system.value(criterion)?,
+            // Rounding may leave less than nothing.
+            value: system.value(criterion)?.max(0.0),
             bound: tightest_bound(&system, &sensors, criterion)?,
             system,
             sensors,
@@ -157,9 +158,18 @@ impl Solution {
         self.system.value(Criterion::MeanSquaredError)
     }
 
-    /// Relative distance of the value from the bound; 0 is optimal. `None` without a bound.
+    /// Relative distance of the value from the bound; 0 is optimal. `None` without a bound, and of a value above a bound of 0.
     pub fn gap(&self) -> Option<f64> {
-        self.bound.map(|b| (self.value - b.value).abs() / b.value)
+        let bound = self.bound?.value;
+        let unit = match self.criterion {
+            Criterion::MeanSquaredError => self.system.model().prior_variance(),
+            Criterion::MutualInformation | Criterion::BayesError => 1.0,
+        };
+        let apart = (self.value - bound).abs();
+        if apart <= VALUE_ERROR * unit {
+            return Some(0.0);
+        }
+        (bound > 0.0).then(|| apart / bound)
     }
 
     /// The word of each sensor for one sample per sensor, in the order of [`Solution::sensors`].
@@ -256,9 +266,12 @@ impl Solution {
             Criterion::BayesError => "error probability",
         };
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "{unit:<20} {:.9}", self.value);
-        if let (Some(bound), Some(gap)) = (self.bound, self.gap()) {
-            let _ = writeln!(text, "bound ({:?})    {:.9}   gap {:.2} %", bound.kind, bound.value, 100.0 * gap);
+        let _ = writeln!(text, "{unit:<20} {}", shown(self.value));
+        if let Some(bound) = self.bound {
+            let gap = self
+                .gap()
+                .map_or(String::new(), |gap| format!("   gap {:.2} %", 100.0 * gap));
+            let _ = writeln!(text, "bound ({:?})    {}{gap}", bound.kind, shown(bound.value));
         }
         let _ = writeln!(
             text,
@@ -271,13 +284,25 @@ impl Solution {
             for (cell, word) in sensor.words.iter().enumerate() {
                 let edge = |i: Option<usize>, open: &str| {
                     i.and_then(|i| sensor.breakpoints.get(i))
-                        .map_or(open.to_owned(), |b| format!("{b:.9}"))
+                        .map_or(open.to_owned(), |b| shown(*b))
                 };
                 let (from, to) = (edge(cell.checked_sub(1), "-inf"), edge(Some(cell), "inf"));
                 let _ = writeln!(text, "  {from:>16} {to:>16}  {word:0width$b}", width = sensor.bits as usize);
             }
         }
         text
+    }
+}
+
+/// Error of a value, in prior variances or nats.
+const VALUE_ERROR: f64 = 1e-12;
+
+/// Nine decimals, or as many digits and an exponent where decimals would hide the number.
+fn shown(number: f64) -> String {
+    if number == 0.0 || (1e-4..1e9).contains(&number.abs()) {
+        format!("{number:.9}")
+    } else {
+        format!("{number:.8e}")
     }
 }
 

@@ -1,0 +1,170 @@
+//! Which columns of a table are no sensors.
+
+use super::meaning::silence;
+use crate::arguments::TrackOptions;
+use crate::error::Error;
+use crate::input::Table;
+use fewbits_table::Kind as Cells;
+
+/// Names of a column that has the name of each row's sensor. Anchors may be numbers.
+const LABELS: [&str; 16] = [
+    "name", "id", "sensor", "device", "entity", "channel", "source", "label", "mote", "tag", "topic", "uid", "anchor",
+    "node", "beacon", "station",
+];
+/// From this one on, numbers are names too, where places are looked for.
+const PLACED: usize = 12;
+/// Names of a column of the standard deviations of each row's values.
+const ACCURACIES: [&str; 8] = [
+    "accuracy",
+    "hacc",
+    "sigma",
+    "std",
+    "stddev",
+    "stdev",
+    "sd",
+    "uncertainty",
+];
+
+/// What may be found of columns that no option names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Finds {
+    /// Which column has the names of the sensors.
+    #[default]
+    Labels,
+    /// Also which one has accuracies.
+    Levels,
+    /// Which column has the names of anchors, perhaps numbers.
+    Anchors,
+}
+
+/// Which columns of a table are no sensors.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Kind {
+    /// What the names and cells of columns may say where no option does.
+    pub(super) finds: Finds,
+    /// Names of the sensors, if each row is one report.
+    pub(super) by: Option<String>,
+    /// Standard deviations of the row's values.
+    pub(super) accuracy: Option<String>,
+    /// Thresholds of the row's bits.
+    pub(super) threshold: Option<String>,
+    /// Whether a sensor that does not report at an instant says something by that.
+    pub(super) is_filled: bool,
+    /// Seconds by which a row may be late.
+    pub(super) late: f64,
+    /// Seconds between measurements of a sensor that sends some of them.
+    pub(super) sampled: Option<f64>,
+}
+
+impl Kind {
+    pub(super) fn of(options: &TrackOptions) -> Result<Self, Error> {
+        let silent = options.silent_within.as_deref().map(silence).transpose()?;
+        Ok(Self {
+            finds: if options.reports { Finds::Labels } else { Finds::Levels },
+            sampled: silent.and_then(|(_, seconds)| seconds),
+            by: options.table.by.clone(),
+            accuracy: options.accuracy_column.clone(),
+            threshold: options.threshold_column.clone(),
+            is_filled: options.silent_within.is_some(),
+            late: options.late.map_or(0.0, |late| late.as_secs_f64()),
+        })
+    }
+
+    pub(super) fn columns(&self) -> impl Iterator<Item = &String> {
+        self.accuracy.iter().chain(&self.threshold)
+    }
+}
+
+/// Columns that are no sensors, as options name them or as they were found.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Roles {
+    pub(super) by: Option<String>,
+    pub(super) accuracy: Option<String>,
+    /// What was found, a line each.
+    pub(super) told: Vec<String>,
+}
+
+/// The words of a name, in small letters.
+fn words(name: &str) -> Vec<String> {
+    let name = name.to_lowercase();
+    let parts = name.split(|letter: char| !letter.is_alphanumeric());
+    parts.filter(|part| !part.is_empty()).map(str::to_owned).collect()
+}
+
+fn holds_words(table: &Table, column: usize) -> bool {
+    matches!(table.kind(column), Cells::Words | Cells::Text)
+}
+
+impl Roles {
+    /// `is_whole`: no option says which columns are used.
+    pub(super) fn find(table: &Table, kind: &Kind, is_whole: bool) -> Self {
+        let mut found = Self {
+            by: kind.by.clone(),
+            accuracy: kind.accuracy.clone(),
+            told: Vec::new(),
+        };
+        let is_free = |i: &usize| {
+            let name = Some(&table.names[*i]);
+            name != kind.by.as_ref() && name != kind.accuracy.as_ref() && name != kind.threshold.as_ref()
+        };
+        let free: Vec<usize> = (0..table.names.len()).filter(is_free).collect();
+        if is_whole && kind.finds == Finds::Levels && found.accuracy.is_none() {
+            let is_accuracy = |i: &&usize| {
+                let words = words(&table.names[**i]);
+                !holds_words(table, **i)
+                    && [words.first(), words.last()]
+                        .iter()
+                        .any(|word| word.is_some_and(|word| ACCURACIES.contains(&word.as_str())))
+            };
+            let those: Vec<&String> = free.iter().filter(is_accuracy).map(|i| &table.names[*i]).collect();
+            match those.as_slice() {
+                [] => {}
+                [name] if free.len() > 1 => {
+                    found.told.push(format!(
+                        "{name} is taken for the accuracy of each row's values, as --accuracy-column {name} says; with --columns it is a sensor"
+                    ));
+                    found.accuracy = Some((*name).clone());
+                }
+                _ => found.told.push(format!(
+                    "{} are taken for sensors: if they are accuracies, choose one sensor by --columns and its --accuracy-column",
+                    those.iter().map(|name| name.as_str()).collect::<Vec<_>>().join(", ")
+                )),
+            }
+        }
+        if found.by.is_none() {
+            let is_label = |i: &&usize| {
+                let words = words(&table.names[**i]);
+                let known = |word: &String| LABELS.iter().position(|label| label == word);
+                let place = words.first().and_then(known);
+                let is_plain = words.len() == 1 || words.get(1).is_some_and(|word| word == "id");
+                let is_number = is_plain && kind.finds == Finds::Anchors;
+                place.is_some_and(|place| holds_words(table, **i) || (is_number && place >= PLACED))
+            };
+            let labels: Vec<&String> = free.iter().filter(is_label).map(|i| &table.names[*i]).collect();
+            let values = free
+                .iter()
+                .filter(|i| !holds_words(table, **i) && Some(&table.names[**i]) != found.accuracy.as_ref());
+            let values = values.filter(|i| !labels.contains(&&table.names[**i])).count();
+            if let ([name], 1) = (labels.as_slice(), values) {
+                found
+                    .told
+                    .push(format!("each row is one reading of the sensor that {name} names, as --by {name} says"));
+                found.by = Some((*name).clone());
+            }
+        }
+        found
+    }
+
+    /// What to do with a column of words, if rows may be readings of the sensors that it names.
+    pub(super) fn hint(&self, table: &Table) -> Option<String> {
+        let worded: Vec<usize> = (0..table.names.len()).filter(|i| holds_words(table, *i)).collect();
+        let ([column], None, true) = (worded.as_slice(), &self.by, table.names.len() > 1) else {
+            return None;
+        };
+        let name = crate::say::name(&table.names[*column]);
+        Some(format!(
+            "column `{name}` holds words, and numbers are expected: if it names the sensor of each row, say --by {name}; otherwise choose \
+             columns with --columns or --without, or name gaps with --missing"
+        ))
+    }
+}

@@ -1,0 +1,190 @@
+//! Kinds of tables on which a stranger would be told too little, or given bands that are too narrow.
+
+use crate::numbers::Numbers;
+use crate::track_found::{has_hint, held, of, tracked};
+use crate::{good, refused, text};
+use serde_json::Value;
+
+/// Defect: the noise of an accurate sensor beside a level that moves by far more was found at the lower end of the search, a hundred times too
+/// small, and the bands with it.
+#[test]
+fn a_noise_that_the_rows_hardly_tell_is_not_tiny() {
+    let mut numbers = Numbers(612);
+    let (mut level, mut table, mut truth) = (0.0, "time,a,b,c,d\n".to_owned(), Vec::new());
+    for row in 0..600 {
+        level += 0.3 * numbers.normal();
+        truth.push(level);
+        let cells = [0.05, 5.0, 0.5, 20.0].map(|noise| format!("{}", level + noise * numbers.normal()));
+        table += &format!("{row},{}\n", cells.join(","));
+    }
+    let (rows, _) = tracked(&table, &[]);
+    let held = rows
+        .iter()
+        .zip(&truth)
+        .filter(|(row, level)| held(row, **level))
+        .count();
+    assert!(held as f64 > 0.9 * truth.len() as f64, "{held} of {}", truth.len());
+}
+
+/// Defect: a value at a stated limit was rounded on its way and, one time in many, taken for a value above it. Defect: a limit that a hint
+/// named was not used.
+#[test]
+fn a_value_at_a_limit_is_at_it() {
+    let mut numbers = Numbers(613);
+    let (mut level, mut marked, mut clipped, mut truth) =
+        (0.3, "time,c\n".to_owned(), "time,c\n".to_owned(), Vec::new());
+    for row in 0..600 {
+        level += 0.03 * numbers.normal() - 0.01 * (level - 0.2);
+        truth.push(level);
+        let value = level + 0.08 * numbers.normal();
+        let below = value < 0.25;
+        marked += &format!("{row},{}\n", if below { "<0.25".to_owned() } else { value.to_string() });
+        clipped += &format!("{row},{}\n", value.max(0.25));
+    }
+    let (by_marks, _) = tracked(&marked, &[]);
+    let (stated, _) = tracked(&clipped, &["--limits", "0.25.."]);
+    let (found, summary) = tracked(&clipped, &[]);
+    assert!(has_hint(&summary, "--limits 0.25.. says"), "{summary}");
+    let apart = |one: &[Value], other: &[Value]| {
+        let pairs = one.iter().zip(other);
+        pairs
+            .map(|(one, other)| (of(one, "level") - of(other, "level")).abs())
+            .fold(0.0, f64::max)
+    };
+    assert!(apart(&stated, &found) == 0.0 && apart(&stated, &by_marks) < 0.02, "{}", apart(&stated, &by_marks));
+    let held = found
+        .iter()
+        .zip(&truth)
+        .filter(|(row, level)| held(row, **level))
+        .count();
+    assert!(held as f64 > 0.9 * truth.len() as f64, "{held} of {}", truth.len());
+}
+
+/// Many zeros are no limit, and values far from all others are gaps: both are only told.
+#[test]
+fn zeros_and_marks_of_gaps_are_no_limits() {
+    let mut numbers = Numbers(614);
+    let (mut zeros, mut gaps) = ("time,rain\n".to_owned(), "time,t\n".to_owned());
+    for row in 0..300 {
+        let value = numbers.normal();
+        zeros += &format!("{row},{}\n", value.max(0.0));
+        gaps += &format!(
+            "{row},{}\n",
+            if row % 7 == 3 {
+                "-999".to_owned()
+            } else {
+                (20.0 + value).to_string()
+            }
+        );
+    }
+    let (_, summary) = tracked(&zeros, &[]);
+    assert!(has_hint(&summary, "if it is a detection limit, say --limits 0.."), "{summary}");
+    let (_, summary) = tracked(&gaps, &[]);
+    assert!(has_hint(&summary, "say --missing -999"), "{summary}");
+}
+
+/// Defect: a column of names was refused without a word of `--by`, and a column of accuracies was a sensor of its own.
+#[test]
+fn columns_that_are_no_sensors_are_seen_by_their_names() {
+    let mut numbers = Numbers(615);
+    let (mut level, mut long, mut wide, mut other) = (
+        0.0,
+        "time,sensor,value\n".to_owned(),
+        "time,pos,accuracy_m\n".to_owned(),
+        "time,state,value\n".to_owned(),
+    );
+    for row in 0..300 {
+        level += 0.3 * numbers.normal();
+        let accuracy = [3.0, 5.0, 50.0][row % 3];
+        let value = level + accuracy * numbers.normal();
+        long += &format!("{row},{},{value}\n", ["a", "b"][row % 2]);
+        wide += &format!("{row},{value},{accuracy}\n");
+        other += &format!("{row},{},{value}\n", ["idle", "busy"][row % 2]);
+    }
+    let same = |table: &str, option: &[&str], told: &str| {
+        let (found, summary) = tracked(table, &[]);
+        assert!(has_hint(&summary, told), "{summary}");
+        assert_eq!(found, tracked(table, option).0);
+    };
+    same(&long, &["--by", "sensor"], "--by sensor says");
+    same(&wide, &["--accuracy-column", "accuracy_m"], "--accuracy-column accuracy_m says");
+    let folder = tempfile::tempdir().unwrap();
+    let problem = refused(folder.path(), &["track", "-"], other.as_bytes());
+    assert!(problem.contains("say --by state"), "{problem}");
+}
+
+/// Defect: where values come on change, silence was tested as a value by the grid: right silences were rejected, and the noise that was found at
+/// the lower end of its search made more of them.
+#[test]
+fn right_silences_are_not_rejected() {
+    for (noise, options) in [
+        (0.05, &["--silent-within", "0.4"][..]),
+        (0.0005, &["--silent-within", "0.4", "--noise", "0.0005"]),
+    ] {
+        let mut numbers = Numbers(616);
+        let (mut level, mut last, mut table, mut truth) = (15.0_f64, f64::NAN, "time,t\n".to_owned(), Vec::new());
+        for row in 0..1000 {
+            level += 0.05 * numbers.normal() - 0.004 * (level - 15.0);
+            truth.push(level);
+            let value = level + noise * numbers.normal();
+            let is_sent = last.is_nan() || (value - last).abs() >= 0.4;
+            if is_sent {
+                last = value;
+            }
+            table += &format!("{},{}\n", 60 * row, if is_sent { value.to_string() } else { String::new() });
+        }
+        let (rows, _) = tracked(&table, options);
+        let rejected: f64 = rows.iter().map(|row| of(row, "rejected")).sum();
+        let kept = rows
+            .iter()
+            .zip(&truth)
+            .filter(|(row, level)| held(row, **level))
+            .count();
+        // Errors last from one value to the next: some forty are independent, and two standard errors of a share of .95 are .07.
+        assert!(rejected <= 4.0 && kept > 880, "{options:?}: {rejected} rejected, {kept} held");
+    }
+}
+
+/// Defect: numbers of small units were printed as 0.000000, an error that rounding made negative as -0.000000000, and a share of nothing as `inf`.
+#[test]
+fn numbers_of_any_unit_are_printed() {
+    let mut numbers = Numbers(617);
+    let (mut level, mut table, mut sample) = (0.0, "time,a,b\n".to_owned(), "y\n".to_owned());
+    for row in 0..300 {
+        level += 1e-10 * numbers.normal();
+        table += &format!("{row},{},{}\n", level + 3e-9 * numbers.normal(), level + 5e-9 * numbers.normal());
+        sample += &format!("{}\n", [0.0, 3e-7, 6e-7, 1e-6][row % 4]);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let page = text(&good(folder.path(), &["fit", "-"], table.as_bytes()));
+    assert!(page.contains("e-9") && !page.contains("0.000000"), "{page}");
+    let words = ["design", "-", "--column", "y", "--noise", "1e-9", "--bits", "2"];
+    let page = text(&good(folder.path(), &words, sample.as_bytes()));
+    assert!(!page.contains("-0.000") && !page.contains("inf %") && page.contains("e-7"), "{page}");
+}
+
+/// Defect: a column of numbers of anchors was taken for an anchor without `--by`, and bits for values without a word.
+#[test]
+fn anchors_by_number_are_found_and_bits_are_told() {
+    let mut numbers = Numbers(618);
+    let places = [(0.0, 0.0), (9.0, 0.0), (9.0, 6.0), (0.0, 6.0)];
+    let (mut anchors, mut ranges, mut bits) =
+        ("id,x,y\n".to_owned(), "t_s,anchor,range_m\n".to_owned(), "t,b\n".to_owned());
+    for (i, (x, y)) in places.iter().enumerate() {
+        anchors += &format!("{i},{x},{y}\n");
+    }
+    for row in 0..400 {
+        let (x, y) = places[row % 4];
+        let range = f64::hypot(x - 3.0, y - 2.0) + 0.05 * numbers.normal();
+        ranges += &format!("{},{},{range}\n", 0.1 * row as f64, row % 4);
+        bits += &format!("{row},{}\n", u8::from(numbers.normal() > 0.0));
+    }
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("anchors.csv"), anchors).unwrap();
+    let words = ["ranges", "-", "--anchors", "anchors.csv"];
+    let found = text(&good(folder.path(), &words, ranges.as_bytes()));
+    let stated = text(&good(folder.path(), &[&words[..], &["--by", "anchor"]].concat(), ranges.as_bytes()));
+    assert_eq!(found, stated);
+    let (_, summary) = tracked(&bits, &[]);
+    assert!(has_hint(&summary, "--reports --send bit"), "{summary}");
+}
