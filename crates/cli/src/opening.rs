@@ -82,24 +82,31 @@ fn decided(
     open: impl Fn(&TableOptions) -> Result<fewbits_table::Table, Error>,
 ) -> Result<fewbits_table::Table, Error> {
     let refused = match open(options) {
-        Err(Error::Refusal { file, source }) if source.is_day_or_month() && is_regular(&options.file) => {
-            Error::Refusal { file, source }
-        }
+        Err(Error::Refusal { file, source }) if source.is_day_or_month() => Error::Refusal { file, source },
         other => return other,
     };
+    match day_order(options)? {
+        Some(said) => open(&said),
+        None => Err(refused),
+    }
+}
+
+/// The options with the order of day and month that all dates of a file decide; `None` if they do not, or it can be read once only.
+pub(crate) fn day_order(options: &TableOptions) -> Result<Option<TableOptions>, Error> {
+    if !is_regular(&options.file) {
+        return Ok(None);
+    }
     let file = name_of(options);
     let mut table = opened(options, file)?;
     table.select::<&str>(&[]).map_err(Error::of_table(file))?;
     let survey = table.survey().map_err(Error::of_table(file))?;
     let mut orders = survey.columns.iter().filter_map(fewbits_table::Profile::day_order);
-    match (orders.next(), orders.next()) {
-        (Some(order), None) => {
-            let mut said = options.clone();
-            said.dialect.time_format = Some(order.to_owned());
-            open(&said)
-        }
-        _ => Err(refused),
-    }
+    let (Some(order), None) = (orders.next(), orders.next()) else {
+        return Ok(None);
+    };
+    let mut said = options.clone();
+    said.dialect.time_format = Some(order.to_owned());
+    Ok(Some(said))
 }
 
 fn chosen_at_once(options: &TableOptions) -> Result<fewbits_table::Table, Error> {

@@ -266,7 +266,6 @@ fn layout(
                     && filled(&rows[header - 1].1) == filled(&rows[header].1)
                     && looks[header - 1].first() != Some(&Look::Number)
                     && !looks[header - 1].contains(&Look::Time)
-                    && !known::is_setting(&rows[header - 1].1)
                     && looks[header - 1].contains(&Look::Text)
                     && (known::are_units(&rows[header].1) || known::are_units_behind(&rows[header].1));
                 dialect.units_row = Some(is_units);

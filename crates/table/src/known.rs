@@ -145,30 +145,6 @@ pub(crate) fn names(format: &str, lines: &[(u64, String)], count: usize) -> Vec<
     (0..count).map(name).collect()
 }
 
-/// Whether a line above the data is one of the settings of an oscilloscope: a name and its value.
-pub(crate) fn is_setting(cells: &[String]) -> bool {
-    const SETTINGS: &[&str] = &[
-        "source",
-        "vertical units",
-        "vertical scale",
-        "vertical offset",
-        "horizontal units",
-        "horizontal scale",
-        "model number",
-        "serial number",
-        "software version",
-        "firmware version",
-        "probe attenuation",
-        "probe atten",
-        "record length",
-        "sample interval",
-        "trigger point",
-    ];
-    cells
-        .first()
-        .is_some_and(|first| SETTINGS.contains(&first.trim().to_lowercase().as_str()))
-}
-
 /// Names of the columns of an EPW file, as far as they are usual.
 const EPW: [&str; 35] = [
     "year",
