@@ -113,7 +113,7 @@ fn info_states_the_largest_and_the_mean_error() {
 #[test]
 fn long_tables_name_the_option() {
     let row = |i: usize| {
-        let state = if i % 3 == 0 {
+        let state = if i.is_multiple_of(3) {
             "idle".to_owned()
         } else {
             format!("{i}.5")

@@ -75,7 +75,9 @@ impl FrameWriter {
     pub fn header_at_once(&self) -> Vec<u8> {
         self.header().unwrap_or_else(|| {
             let ranges = vec![0.0; self.schema.columns.len()];
-            Header::new(self.schema.clone(), &[], ranges).to_bytes()
+            Header::new(self.schema.clone(), &[], ranges)
+                .with_form(Form::Stream)
+                .to_bytes()
         })
     }
 
