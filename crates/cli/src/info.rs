@@ -2,9 +2,9 @@
 
 use crate::arguments::InfoOptions;
 use crate::error::Error;
-use crate::numbers::{exact, widened};
+use crate::numbers::{exact, short, widened};
 use crate::{Ending, bounds, clock, output, recording, say};
-use fewbits_record::{Column, TimeBase};
+use fewbits_record::{Bound, Column, TimeBase};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -30,6 +30,9 @@ struct ColumnInfo {
     name: String,
     unit: String,
     bound: String,
+    /// The largest error that the bound allows, and the mean error of values that are spread evenly; `null` if they depend on each value.
+    largest_error: Option<f64>,
+    mean_error: Option<f64>,
     min: Option<End>,
     max: Option<End>,
     gaps: u64,
@@ -72,6 +75,8 @@ pub(crate) fn run(options: &InfoOptions) -> Result<Ending, Error> {
             name: column.name().to_owned(),
             unit: column.unit().to_owned(),
             bound: bounds::of_column(column),
+            largest_error: None,
+            mean_error: None,
             min: None,
             max: None,
             gaps: 0,
@@ -101,6 +106,9 @@ pub(crate) fn run(options: &InfoOptions) -> Result<Ending, Error> {
                 info.max = Some(info.max.filter(|max| *max >= value).unwrap_or(value));
             }
         }
+    }
+    for (info, column) in columns.iter_mut().zip(schema.columns()) {
+        (info.largest_error, info.mean_error) = errors(column, info.min.zip(info.max)).unzip();
     }
     let samples = (rows * columns.len() as u64).max(1);
     let info = Info {
@@ -140,6 +148,23 @@ pub(crate) fn run(options: &InfoOptions) -> Result<Ending, Error> {
     })
 }
 
+/// The largest error of a column within its bound, and the mean one if values are spread evenly between the numbers that the recording has for
+/// them: half of the largest. Bounds of an earlier recording are added to both, since their errors are not known. `ends`: the column's
+/// smallest and largest number, as restored.
+fn errors(column: &Column, ends: Option<(End, End)>) -> Option<(f64, f64)> {
+    let largest = match (column.bound(), ends) {
+        (Bound::Lossless, _) => 0.0,
+        (Bound::Absolute(bound), _) => bound,
+        // The range that was restored is smaller than that of the table by twice the bound at most.
+        (Bound::ShareOfRange(share), Some((End::Number(low), End::Number(high)))) if share < 0.5 => {
+            share * (high - low) / (1.0 - 2.0 * share)
+        }
+        _ => return None,
+    };
+    let earlier = column.earlier_bound();
+    Some((largest + earlier, 0.5 * largest + earlier))
+}
+
 fn text(info: &Info) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
@@ -174,7 +199,14 @@ fn text(info: &Info) -> String {
             (Some(min), Some(max)) => format!("{} to {}{unit}", min.text(), max.text()),
             _ => "no values".to_owned(),
         };
-        let _ = writeln!(text, "  {}: {}, {ends}, {} gaps", say::name(&column.name), column.bound, column.gaps);
+        let errors = match (column.largest_error, column.mean_error) {
+            (Some(largest), Some(mean)) if largest > 0.0 => {
+                format!(" (largest error {}, mean about {})", short(largest), short(mean))
+            }
+            _ => String::new(),
+        };
+        let name = say::name(&column.name);
+        let _ = writeln!(text, "  {name}: {}{errors}, {ends}, {} gaps", column.bound, column.gaps);
     }
     text
 }

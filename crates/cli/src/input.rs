@@ -83,6 +83,23 @@ impl Table {
         self.names = self.table.selected().iter().map(|i| columns[*i].name.clone()).collect();
     }
 
+    /// Whether the first rows are plain numbers, and no other rows were read.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.learned.is_none() && self.table.is_plain()
+    }
+
+    /// What the first rows show, if all others are like them: no ranges, and the decimals of the finest time.
+    pub(crate) fn first_survey(&mut self) -> Result<Survey, Error> {
+        let is_empty = !self.fill()?;
+        let times = self.batch.times.iter();
+        Ok(Survey {
+            ends: vec![None; self.names.len()],
+            few: vec![None; self.names.len()],
+            decimals: times.map(|time| time.decimals()).max().unwrap_or(0),
+            is_empty,
+        })
+    }
+
     /// The name of the table in messages.
     pub(crate) fn file(&self) -> &str {
         &self.file

@@ -44,6 +44,20 @@ fn number(number: Number) -> String {
     }
 }
 
+/// The word for a unit of times.
+fn unit_named(format: &str) -> Option<&'static str> {
+    Some(match format {
+        "s" => "seconds",
+        "ms" => "milliseconds",
+        "us" => "microseconds",
+        "ns" => "nanoseconds",
+        "min" => "minutes",
+        "h" => "hours",
+        "d" => "days",
+        _ => return None,
+    })
+}
+
 /// What was understood, for people. Writing to a string cannot fail.
 fn text(look: &Look) -> String {
     let mut text = String::new();
@@ -60,6 +74,10 @@ fn text(look: &Look) -> String {
                 Scale::Utc => "UTC",
                 Scale::Local => "local time, its zone is not known (--time-zone says it)",
                 _ => "seconds",
+            };
+            let what = match time.format.as_deref().and_then(unit_named) {
+                Some(unit) => format!("{what}, from numbers of {unit}"),
+                None => what.to_owned(),
             };
             let names = say::name(&time.columns.join(", ")).into_owned();
             let (from, to) = (time.from.as_deref().unwrap_or("-"), time.to.as_deref().unwrap_or("-"));
@@ -126,6 +144,10 @@ fn text(look: &Look) -> String {
                 exact(value)
             );
         }
+    }
+    if let Some(options) = &look.long {
+        let _ =
+            writeln!(text, "each row may be one reading of a sensor: {} makes a column of each", say::name(options));
     }
     if look.lines_left_out > 0 {
         let _ = writeln!(text, "{} lines cannot be read (--skip-bad {0} leaves them out):", look.lines_left_out);

@@ -26,6 +26,7 @@ mod many;
 mod node;
 mod notes;
 mod numbers;
+mod once;
 mod opening;
 mod output;
 mod pack;

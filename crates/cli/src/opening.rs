@@ -3,6 +3,7 @@
 use crate::arguments::TableOptions;
 use crate::clock;
 use crate::error::Error;
+use crate::files::is_regular;
 use fewbits_table::names;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fs::File;
@@ -69,8 +70,46 @@ pub(crate) fn name_of(options: &TableOptions) -> &str {
     }
 }
 
-/// A table with the time and the columns that the options choose.
+/// A table with the time and the columns that the options choose. If its first rows leave open whether day or month stands first, all rows
+/// of a file decide.
 pub(crate) fn chosen(options: &TableOptions) -> Result<fewbits_table::Table, Error> {
+    decided(options, chosen_at_once)
+}
+
+/// A table, opened once more with the order of day and month that all of its dates decide, if it was refused for that.
+fn decided(
+    options: &TableOptions,
+    open: impl Fn(&TableOptions) -> Result<fewbits_table::Table, Error>,
+) -> Result<fewbits_table::Table, Error> {
+    let refused = match open(options) {
+        Err(Error::Refusal { file, source }) if source.is_day_or_month() => Error::Refusal { file, source },
+        other => return other,
+    };
+    match day_order(options)? {
+        Some(said) => open(&said),
+        None => Err(refused),
+    }
+}
+
+/// The options with the order of day and month that all dates of a file decide; `None` if they do not, or it can be read once only.
+pub(crate) fn day_order(options: &TableOptions) -> Result<Option<TableOptions>, Error> {
+    if !is_regular(&options.file) {
+        return Ok(None);
+    }
+    let file = name_of(options);
+    let mut table = opened(options, file)?;
+    table.select::<&str>(&[]).map_err(Error::of_table(file))?;
+    let survey = table.survey().map_err(Error::of_table(file))?;
+    let mut orders = survey.columns.iter().filter_map(fewbits_table::Profile::day_order);
+    let (Some(order), None) = (orders.next(), orders.next()) else {
+        return Ok(None);
+    };
+    let mut said = options.clone();
+    said.dialect.time_format = Some(order.to_owned());
+    Ok(Some(said))
+}
+
+fn chosen_at_once(options: &TableOptions) -> Result<fewbits_table::Table, Error> {
     let file = name_of(options);
     let failed = Error::of_table(file);
     let stored = options.dialect.said()?.time_column;
@@ -138,8 +177,12 @@ pub(crate) fn time_columns(table: &fewbits_table::Table, list: &str) -> Vec<Stri
 
 /// A table with the time that the options choose, or that it certainly has.
 pub(crate) fn with_time(options: &TableOptions) -> Result<fewbits_table::Table, Error> {
+    decided(options, with_time_at_once)
+}
+
+fn with_time_at_once(options: &TableOptions) -> Result<fewbits_table::Table, Error> {
     let failed = Error::of_table(name_of(options));
-    let mut table = chosen(options)?;
+    let mut table = chosen_at_once(options)?;
     match options.by {
         Some(_) => table.set_time(&["#1"]).map_err(&failed)?,
         None if table.time().is_none() => drop(table.find_certain_time().map_err(&failed)?),

@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::files::is_regular;
 use crate::input::{Survey, Table};
 use crate::live::{self, RowSink};
+use crate::once::{identity, is_file_to_be, once_readable};
 use crate::rows::TableRows;
 use crate::say::say;
 use crate::target::{self, Target};
@@ -14,7 +15,7 @@ use fewbits_record::{Bound, Column, Effort, Playback, Recorder, Schema, TimeBase
 use fewbits_table::{Kind, names};
 use serde::Serialize;
 use std::fs::File;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -32,10 +33,27 @@ struct Done {
     summary: String,
 }
 
-/// The schema of a table, and the table at its first row. A file is read twice if ranges or the decimals of times are needed; what can
+/// What is known of a file before its rows are packed.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Known {
+    /// All of its rows were read.
+    All,
+    /// The first rows. If others are not like them, they are refused.
+    First,
+}
+
+/// The schema of a table, and the table at its first row. A file is read twice, so that all rows tell ranges, kinds and decimals; what can
 /// be read once only (a pipe) is read once.
 pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Table, Schema), Error> {
-    let mut open = Table::open(table)?;
+    schema_of(Table::open(table)?, table, options, Known::All)
+}
+
+fn schema_of(
+    mut open: Table,
+    table: &TableOptions,
+    options: &BoundOptions,
+    known: Known,
+) -> Result<(Table, Schema), Error> {
     if open.names.len() > MAX_COLUMNS {
         let problem = format!(
             "{} columns, and a recording has at most {MAX_COLUMNS}: pack some of them into each of several files with --columns",
@@ -48,9 +66,10 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
         return Err(Error::content(open.file(), problem));
     }
     // All rows of a file tell what its columns are.
-    let survey: Option<Survey> = match is_regular(&table.file) {
-        true => Some(open.survey(table)?),
-        false => None,
+    let survey: Option<Survey> = match (is_regular(&table.file), known) {
+        (true, Known::All) => Some(open.survey(table)?),
+        (true, Known::First) => Some(open.first_survey()?),
+        (false, _) => None,
     };
     check_words(&open)?;
     let mut specs = bounds::parse(&options.bound, &open.names, open.file())?;
@@ -273,7 +292,24 @@ fn appended(
 }
 
 fn create(options: &PackOptions, effort: Effort) -> Result<(Done, Option<Error>), Error> {
+    // If no range is needed and all rows are like the first ones, reading them once gives the same bytes as reading them twice.
+    if options.output.as_deref().is_some_and(is_file_to_be)
+        && let Some(table) = once_readable(&options.table, &options.bounds)?
+        && let Ok((table, schema)) = schema_of(table, &options.table, &options.bounds, Known::First)
+        && let Ok(done) = created(options, effort, table, schema)
+    {
+        return Ok(done);
+    }
     let (table, schema) = schema(&options.table, &options.bounds)?;
+    created(options, effort, table, schema)
+}
+
+fn created(
+    options: &PackOptions,
+    effort: Effort,
+    table: Table,
+    schema: Schema,
+) -> Result<(Done, Option<Error>), Error> {
     let sink = Target::open_binary(options.output.as_deref())?;
     let file = sink.name().to_owned();
     let mut recorder = Recorder::new(Counted { sink, bytes: 0 }, schema.clone()).with_effort(effort);
@@ -286,20 +322,6 @@ fn create(options: &PackOptions, effort: Effort) -> Result<(Done, Option<Error>)
         counted.sink.finish()?;
     }
     Ok((Done::of(rows, counted.bytes, &schema), error))
-}
-
-/// An identity that depends on the bytes of the table and on the schema: the same command gives the same bytes, also after a kill.
-fn identity(file: &str, schema: &Schema) -> std::io::Result<u32> {
-    // FNV-1a.
-    let add = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
-    let mut hash = format!("{schema:?}").as_bytes().iter().fold(0xcbf2_9ce4_8422_2325, add);
-    let (mut source, mut chunk) = (File::open(file)?, vec![0; 1 << 16]);
-    loop {
-        match source.read(&mut chunk)? {
-            0 => return Ok((hash ^ (hash >> 32)) as u32),
-            count => hash = chunk[..count].iter().fold(hash, add),
-        }
-    }
 }
 
 /// Runs the task.

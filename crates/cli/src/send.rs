@@ -25,6 +25,17 @@ enum FrameSink {
 }
 
 impl FrameSink {
+    /// Sends the header of a stream if no frame was sent: a table without rows is a recording without rows.
+    fn finish(&mut self, writer: &FrameWriter) -> Result<(), Error> {
+        match self {
+            Self::Stream { sink, begun: false } => {
+                let failed = Error::io(sink.name(), "write");
+                sink.write_all(&writer.header_at_once()).map_err(failed)
+            }
+            _ => Ok(()),
+        }
+    }
+
     fn send(&mut self, writer: &FrameWriter, frames: Vec<Vec<u8>>) -> Result<(), Error> {
         for frame in frames {
             match self {
@@ -132,6 +143,7 @@ pub(crate) fn run(options: &SendOptions) -> Result<Ending, Error> {
     if let Some(error) = ended.error {
         return Err(error);
     }
+    sender.sink.finish(&sender.writer)?;
     match sender.sink {
         FrameSink::Stream { sink, .. } => sink.finish()?,
         FrameSink::Frames { .. } => {}

@@ -80,8 +80,8 @@ pub(crate) struct DialectOptions {
     /// Spellings of gaps besides the usual ones, as `-9999,ERR`; of one column as `wind=999`.
     #[arg(long, value_name = "TEXTS", allow_hyphen_values = true)]
     pub(crate) missing: Option<String>,
-    /// How times are written: as '%d.%m.%Y %H:%M:%S', the order `dmy`, `mdy` or `ymd`, the unit of numbers `s`, `ms`, `us` or `ns`,
-    /// or `excel`, `matlab`, `mjd`, `jd`, `labview` for numbers of days or seconds as of these.
+    /// How times are written: as '%d.%m.%Y %H:%M:%S', the order `dmy`, `mdy` or `ymd`, the unit of numbers `s`, `ms`, `us`, `ns`,
+    /// `min`, `h` or `d`, or `excel`, `matlab`, `mjd`, `jd`, `labview` for numbers of days or seconds as of these.
     #[arg(long, value_name = "FORMAT")]
     pub(crate) time_format: Option<String>,
     /// Zone of times without an offset, as Europe/Berlin or +01:00. Default: they are kept as local times.

@@ -3,6 +3,7 @@
 use crate::arguments::{TableOptions, VerifyOptions};
 use crate::error::Error;
 use crate::input::Table;
+use crate::opening::day_order;
 use crate::rows::TableRows;
 use crate::{Ending, clock, numbers, output, recording, say};
 use fewbits_recipes::names;
@@ -106,16 +107,13 @@ fn matched(table: &mut Table, options: &TableOptions, schema: &Schema) -> Result
     Ok(matches)
 }
 
-/// Runs the task.
-pub(crate) fn run(options: &VerifyOptions) -> Result<Ending, Error> {
-    let file = options.packed.display().to_string();
-    let mut playback = recording::open(&options.packed)?;
-    let schema = playback.schema().clone();
-    let mut table = Table::open(&match options.table.by {
+/// The table with the columns that the recording has, and the index there of each.
+fn opened(options: &TableOptions, schema: &Schema) -> Result<(Table, Vec<usize>), Error> {
+    let mut table = Table::open(&match options.by {
         // Columns of the long table are chosen here.
         Some(_) => TableOptions {
             time: None,
-            ..options.table.clone()
+            ..options.clone()
         },
         // Columns are chosen by the recording's.
         None => TableOptions {
@@ -123,10 +121,25 @@ pub(crate) fn run(options: &VerifyOptions) -> Result<Ending, Error> {
             time_column: None,
             columns: Vec::new(),
             without: None,
-            ..options.table.clone()
+            ..options.clone()
         },
     })?;
-    let matches = matched(&mut table, &options.table, &schema)?;
+    let matches = matched(&mut table, options, schema)?;
+    Ok((table, matches))
+}
+
+/// Runs the task.
+pub(crate) fn run(options: &VerifyOptions) -> Result<Ending, Error> {
+    let file = options.packed.display().to_string();
+    let mut playback = recording::open(&options.packed)?;
+    let schema = playback.schema().clone();
+    let (table, matches) = match opened(&options.table, &schema) {
+        Err(Error::Refusal { file, source }) if source.is_day_or_month() => match day_order(&options.table)? {
+            Some(said) => opened(&said, &schema)?,
+            None => return Err(Error::Refusal { file, source }),
+        },
+        other => other?,
+    };
     let mut rows = TableRows::new(table, schema.time());
     let mut go = |_| ControlFlow::Continue(());
     let verdict = recipe(&mut playback, &mut rows, &matches, &mut go).map_err(Error::recipe(&file))?;

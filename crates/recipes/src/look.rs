@@ -19,6 +19,8 @@ pub struct Look {
     pub time: Option<LookTime>,
     /// All columns, those of the time too.
     pub columns: Vec<LookColumn>,
+    /// The options that make a column of each sensor, if rows look like single readings of several sensors.
+    pub long: Option<String>,
     /// Lines that cannot be read.
     pub lines_left_out: u64,
     /// What is wrong with the first of them.
@@ -37,6 +39,8 @@ pub struct LookTime {
     pub columns: Vec<String>,
     /// What times are measured from.
     pub scale: Scale,
+    /// Unit or format of times that are numbers, as `--time-format` says it.
+    pub format: Option<String>,
     /// The first time.
     pub from: Option<String>,
     /// The last time.
@@ -106,6 +110,7 @@ pub struct LookColumn {
 pub fn look(table: Table, watch: &mut Watch<'_>) -> Result<Look, Error> {
     let (columns, dialect) = (table.columns().to_vec(), table.dialect().clone());
     let scale = table.time().map(|(_, scale)| scale);
+    let long = table.readings().map(|readings| readings.as_options());
     let mut stopped = Ok(());
     let survey = table.survey_watched(&mut |rows| {
         stopped = report(watch, rows);
@@ -118,6 +123,7 @@ pub fn look(table: Table, watch: &mut Watch<'_>) -> Result<Look, Error> {
         LookTime {
             columns: dialect.time_column.clone(),
             scale,
+            format: dialect.time_format.clone(),
             from: times.ends.map(|ends| shown(ends.0)),
             to: times.ends.map(|ends| shown(ends.1)),
             decimals: times.decimals,
@@ -137,6 +143,7 @@ pub fn look(table: Table, watch: &mut Watch<'_>) -> Result<Look, Error> {
             .zip(&survey.columns)
             .map(|(known, profile)| column(known, profile, &survey))
             .collect(),
+        long,
         lines_left_out: survey.skipped.bad,
         faults: survey.skipped.faults.clone(),
         repeated_lines: survey.skipped.repeated,

@@ -118,8 +118,7 @@ pub fn name(table: &Table, values: &[String]) -> String {
     let name = match table.time() {
         Some(([only], _)) => {
             let made_up = format!("column_{}", only + 1);
-            let column = table.columns().get(*only);
-            column.map(|column| column.name.clone()).filter(|name| *name != made_up)
+            table.time_name().map(str::to_owned).filter(|name| *name != made_up)
         }
         _ => None,
     };

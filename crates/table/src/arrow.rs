@@ -6,11 +6,11 @@ use crate::number::{self, Number};
 use crate::time::{Scale, Time};
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    ArrowPrimitiveType, Date32Type, Date64Type, Decimal32Type, Decimal64Type, Decimal128Type, DurationMicrosecondType,
-    DurationMillisecondType, DurationNanosecondType, DurationSecondType, Float16Type, Float32Type, Float64Type,
-    Int8Type, Int16Type, Int32Type, Int64Type, Time32MillisecondType, Time32SecondType, Time64MicrosecondType,
-    Time64NanosecondType, TimestampMicrosecondType, TimestampMillisecondType, TimestampNanosecondType,
-    TimestampSecondType, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
+    ArrowPrimitiveType, Date32Type, Date64Type, Decimal32Type, Decimal64Type, Decimal128Type, Decimal256Type,
+    DurationMicrosecondType, DurationMillisecondType, DurationNanosecondType, DurationSecondType, Float16Type,
+    Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, Time32MillisecondType, Time32SecondType,
+    Time64MicrosecondType, Time64NanosecondType, TimestampMicrosecondType, TimestampMillisecondType,
+    TimestampNanosecondType, TimestampSecondType, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
 };
 use arrow_array::{Array, ArrayRef};
 use arrow_schema::{DataType, Field, TimeUnit};
@@ -31,7 +31,9 @@ pub(crate) fn kind_of(kind: &DataType) -> Result<Option<Kind>, ()> {
         }
         // A profile tells whether all are doubles.
         DataType::Int64 | DataType::UInt64 => Kind::Integer,
-        DataType::Decimal32(..) | DataType::Decimal64(..) | DataType::Decimal128(..) => Kind::Number,
+        DataType::Decimal32(..) | DataType::Decimal64(..) | DataType::Decimal128(..) | DataType::Decimal256(..) => {
+            Kind::Number
+        }
         DataType::Boolean => Kind::Boolean,
         DataType::Timestamp(..) | DataType::Date32 | DataType::Date64 => Kind::Time,
         DataType::Time32(_) | DataType::Time64(_) | DataType::Duration(_) => Kind::Time,
@@ -88,12 +90,13 @@ where
 }
 
 /// Decimals of a fixed scale, each the nearest double; `None` if one is a whole number that is no double.
-fn decimals<T: ArrowPrimitiveType>(array: &dyn Array, scale: i8) -> Option<Decoded>
-where
-    T::Native: Into<i128>,
-{
+fn decimals<T: ArrowPrimitiveType>(
+    array: &dyn Array,
+    scale: i8,
+    wide: impl Fn(T::Native) -> Option<i128>,
+) -> Option<Decoded> {
     let number = |value: T::Native| {
-        let value: i128 = value.into();
+        let value = wide(value)?;
         let (sign, size) = (if value < 0 { "-" } else { "" }, value.unsigned_abs().to_string());
         let places = usize::try_from(scale).unwrap_or(0);
         let text = if scale < 0 {
@@ -190,9 +193,10 @@ fn plain(array: &ArrayRef) -> Option<Decoded> {
             let doubles = whole.iter().map(|cell| cell.map_or(Some(None), |x| exact(x).map(Some)));
             Some(Decoded::Cells(Cells::Numbers(doubles.collect::<Option<_>>()?)))
         }
-        DataType::Decimal32(_, scale) => decimals::<Decimal32Type>(array, *scale),
-        DataType::Decimal64(_, scale) => decimals::<Decimal64Type>(array, *scale),
-        DataType::Decimal128(_, scale) => decimals::<Decimal128Type>(array, *scale),
+        DataType::Decimal32(_, scale) => decimals::<Decimal32Type>(array, *scale, |x| Some(x.into())),
+        DataType::Decimal64(_, scale) => decimals::<Decimal64Type>(array, *scale, |x| Some(x.into())),
+        DataType::Decimal128(_, scale) => decimals::<Decimal128Type>(array, *scale, Some),
+        DataType::Decimal256(_, scale) => decimals::<Decimal256Type>(array, *scale, |x| x.to_i128()),
         DataType::Boolean => Some(Decoded::Cells(Cells::Booleans(array.as_boolean().iter().collect()))),
         DataType::Timestamp(unit, _) => match unit {
             Second => times::<TimestampSecondType>(array, decimals_of(*unit)),

@@ -6,86 +6,11 @@ use crate::days::{by_name, may_be_days, may_be_julian};
 use crate::dialect::Dialect;
 use crate::error::Error;
 use crate::guess;
+use crate::interval;
+use crate::named::{NAMES, OF_DAY, is_exact_name, is_time_name};
 use crate::parts::{calendar, monthly, of_day_parts, parts};
 use crate::time::{Scale, Unit};
 use crate::written::{self, Clock, Order, Problem, Syntax};
-
-/// Names of a column that is taken as time, if no column has dates.
-const NAMES: [&str; 33] = [
-    "time",
-    "timestamp",
-    "datetime",
-    "date",
-    "ts",
-    "_time",
-    "epoch",
-    "date_time",
-    "date time",
-    "zeitstempel",
-    "zeit",
-    "datum",
-    "utc",
-    "x_value",
-    "created_at",
-    "last_changed",
-    "mess_datum",
-    "yyyymmdd",
-    "tmstamp",
-    "time stamp",
-    "fecha",
-    "zeitpunkt",
-    "when",
-    // Short ones last: beside another, they may be anything.
-    "seconds",
-    "second",
-    "sec",
-    "t",
-    "t_s",
-    "t(s)",
-    "t (s)",
-    "t[s]",
-    "t [s]",
-    "t/s",
-];
-/// Names of a column of times of day beside one of dates.
-const OF_DAY: [&str; 13] = [
-    "time",
-    "zeit",
-    "uhrzeit",
-    "heure",
-    "hora",
-    "ora",
-    "tijd",
-    "gps_time",
-    "hhmm",
-    "hhmmss",
-    "hrmn",
-    "hrmin",
-    "hour_minute",
-];
-
-fn is_time_name(name: &str) -> bool {
-    let lower = name.to_lowercase();
-    NAMES.contains(&lower.as_str())
-        || [
-            "timestamp",
-            "time_",
-            "time ",
-            "date time",
-            "datetime",
-            "date-time",
-            "time(",
-            "time[",
-            "zeit ",
-            "zeit(",
-            "zeit[",
-        ]
-        .iter()
-        .any(|begin| lower.starts_with(begin))
-        || ["_time", " time", "_timestamp", "_date"]
-            .iter()
-            .any(|end| lower.ends_with(end))
-}
 
 /// What the cells of a column say of the time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -198,7 +123,15 @@ pub(crate) fn guess(
             return Some(vec![by_name.copied().unwrap_or(several[0])]);
         }
     }
-    let exact = NAMES.iter().find_map(|name| named(name));
+    let with_unit = |name: &str| {
+        columns
+            .iter()
+            .position(|column| is_exact_name(&column.own_name.to_lowercase(), name))
+    };
+    let exact = NAMES
+        .iter()
+        .find_map(|name| named(name))
+        .or_else(|| NAMES.iter().find_map(|name| with_unit(name)));
     let like = || {
         columns
             .iter()
@@ -237,23 +170,21 @@ pub(crate) fn clock(
         found?
     } else {
         match dialect.time_format.as_deref() {
-            Some("s") => Syntax::Number(Unit::Seconds),
-            Some("ms") => Syntax::Number(Unit::Milliseconds),
-            Some("us") => Syntax::Number(Unit::Microseconds),
-            Some("ns") => Syntax::Number(Unit::Nanoseconds),
+            Some(unit @ ("s" | "ms" | "us" | "ns")) => Syntax::Number(interval::part(unit).unwrap_or(Unit::Seconds)),
             Some("dmy") => Syntax::Date(Order::Dmy),
             Some("mdy") => Syntax::Date(Order::Mdy),
             Some("ymd" | "iso") => Syntax::Date(Order::Ymd),
             Some(format) if written::since(format).is_some() => Syntax::Since(0, 0),
             Some(format) if format.contains('%') => Syntax::Format(format.to_owned()),
             Some(other) => {
-                let expected = "`dmy`, `mdy`, `ymd`, the unit of numbers `s`, `ms`, `us` or `ns`, numbers of days or \
+                let expected = "`dmy`, `mdy`, `ymd`, the unit of numbers `s`, `ms`, `us`, `ns`, `min`, `h` or `d`, numbers of days or \
                                 seconds as of `excel`, `matlab`, `mjd`, `jd` or `labview`, or a format as '%d.%m.%Y %H:%M:%S'";
                 return Err(Ok(Error::option("--time-format", other, expected)));
             }
             None => by_name(names, &cells).map_or_else(|| majority(&cells), Ok)?,
         }
     };
+    let syntax = with_stated_unit(syntax, names, &cells, dialect);
     if let Some((syntax, scale)) = dialect.time_format.as_deref().and_then(written::since) {
         return Ok(Clock {
             syntax,
@@ -295,7 +226,13 @@ pub(crate) fn clock(
             .fold(0.0_f64, |most, x| most.max(x.abs()))
     };
     let scale = match &syntax {
-        Syntax::Number(unit) if *unit != Unit::Seconds && Unit::of_epoch(largest()).is_some() => Scale::Utc,
+        // Numbers of one unit that are smaller than its times since 1970 count from a zero of the logger.
+        Syntax::Number(unit)
+            if *unit != Unit::Seconds
+                && Unit::of_epoch(largest()).is_some_and(|found| found.decimals() >= unit.decimals()) =>
+        {
+            Scale::Utc
+        }
         _ if !is_dated => Scale::Seconds,
         _ if has_offset || zone_text.is_some() => Scale::Utc,
         _ => Scale::Local,
@@ -318,6 +255,18 @@ pub(crate) fn clock(
 
 /// How times are written, or the refusal: an error, or the row of the sample and its problem.
 type Found = Result<Syntax, Result<Error, (usize, Problem)>>;
+
+/// Numbers with the unit that the name of their column states. Times since 1970 keep that of their size if the name states seconds.
+fn with_stated_unit(syntax: Syntax, names: &[&str], cells: &[&str], dialect: &mut Dialect) -> Syntax {
+    let ([name], Syntax::Number(_), None) = (names, &syntax, &dialect.time_format) else {
+        return syntax;
+    };
+    let Some((unit, _)) = interval::of_name(name).filter(|(unit, _)| *unit != "s" && !may_be_days(names, cells)) else {
+        return syntax;
+    };
+    dialect.time_format = Some(unit.to_owned());
+    interval::part(unit).map_or_else(|| Syntax::Since(interval::seconds(unit).unwrap_or(1), 0), Syntax::Number)
+}
 
 /// A date in the first column and the hour, and perhaps minute and second, in those behind it.
 fn dated_hours(names: &[&str], sample: &[String], format: Option<&str>) -> Option<Found> {

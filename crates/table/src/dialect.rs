@@ -62,8 +62,8 @@ pub struct Dialect {
     /// Columns that give the time, one or several.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub time_column: Vec<String>,
-    /// How times are written: as of `strftime`, `dmy`, `mdy`, `ymd`, or the unit of numbers: `s`, `ms`, `us`, `ns`; numbers of days or seconds
-    /// of other programs: `excel`, `matlab`, `mjd`, `jd`, `labview`.
+    /// How times are written: as of `strftime`, `dmy`, `mdy`, `ymd`, or the unit of numbers: `s`, `ms`, `us`, `ns`, `min`, `h`, `d`; numbers of
+    /// days or seconds of other programs: `excel`, `matlab`, `mjd`, `jd`, `labview`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_format: Option<String>,
     /// Zone of times without an offset: a name, as `Europe/Berlin`, or an offset, as `+01:00`.

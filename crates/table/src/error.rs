@@ -137,6 +137,13 @@ impl Error {
         }
     }
 
+    /// Whether dates may have the day or the month first, which rows behind the first ones may decide: [`Profile::day_order`].
+    ///
+    /// [`Profile::day_order`]: crate::Profile::day_order
+    pub fn is_day_or_month(&self) -> bool {
+        matches!(self, Self::Cell { problem, .. } if *problem == crate::written::AMBIGUOUS.0)
+    }
+
     /// Where the fault is, if it is that of one row: what [`Dialect::skip_bad`](crate::Dialect::skip_bad) may leave out.
     pub fn place(&self) -> Option<Place> {
         match self {

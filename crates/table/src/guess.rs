@@ -2,7 +2,7 @@
 
 use crate::civil::{self, Zone, digits, is_compact};
 use crate::time::{Scale, Unit};
-use crate::written::{AMBIGUOUS, Clock, NAMED_ZONE, Order, Problem, Syntax};
+use crate::written::{AMBIGUOUS, Clock, NAMED_ZONE, Order, Problem, Syntax, YEAR};
 
 /// How cells of a column are written, if all are times; an ambiguity if the day or the month may stand first.
 pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Problem>> {
@@ -41,6 +41,9 @@ pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Problem>> {
         return all(Syntax::Date(Order::Ymd)).then_some(Ok(Syntax::Date(Order::Ymd)));
     }
     let (dmy, mdy) = (all(Syntax::Date(Order::Dmy)), all(Syntax::Date(Order::Mdy)));
+    if (dmy || mdy) && may_have_year_first(cells) {
+        return Some(Err(YEAR));
+    }
     let is_dotted = cells
         .iter()
         .all(|cell| digits(cell.trim(), 2).is_some_and(|(_, _, rest)| rest.starts_with('.')));
@@ -57,6 +60,28 @@ pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Problem>> {
         (false, true) => Some(Ok(Syntax::Date(Order::Mdy))),
         (false, false) => all(Syntax::Date(Order::Ymd)).then_some(Ok(Syntax::Date(Order::Ymd))),
     }
+}
+
+/// The three numbers at the beginning of a date with marks between them, and whether each has two digits at most.
+pub(crate) fn three(cell: &str) -> Option<([i64; 3], bool)> {
+    let (first, first_count, rest) = digits(cell.trim(), 4)?;
+    let mark = rest.chars().next().filter(|mark| matches!(mark, '/' | '-' | '.'))?;
+    let (second, second_count, rest) = digits(&rest[1..], 4)?;
+    let (third, third_count, _) = digits(rest.strip_prefix(mark)?, 4)?;
+    Some(([first, second, third], first_count.max(second_count).max(third_count) <= 2))
+}
+
+/// Whether dates of two digits each may be of one year that stands first: their first number stays, and their last changes.
+fn may_have_year_first(cells: &[&str]) -> bool {
+    let dates: Option<Vec<[i64; 3]>> = cells
+        .iter()
+        .map(|cell| three(cell).filter(|(_, is_short)| *is_short).map(|(date, _)| date))
+        .collect();
+    let is_date = |[_, month, day]: &[i64; 3]| (1..=12).contains(month) && (1..=31).contains(day);
+    dates.is_some_and(|dates| {
+        let varies = |i: usize| dates.iter().any(|date| date[i] != dates[0][i]);
+        varies(2) && !varies(0) && dates.iter().all(is_date)
+    })
 }
 
 /// Whether a written time says something of its zone.

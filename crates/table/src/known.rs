@@ -22,6 +22,13 @@ pub(crate) fn recognise(lines: &[(u64, String)], dialect: &mut Dialect) {
     let Some((_, first)) = lines.first() else { return };
     let first = first.trim_start_matches('\u{feff}');
     let bare = first.trim_start_matches('"');
+    if is_tektronix(lines) && dialect.skip.is_none() && dialect.no_header.is_none() {
+        // Tektronix oscilloscopes: settings in the first three columns beside the first rows, no names.
+        dialect.format.get_or_insert(TEKTRONIX.to_owned());
+        dialect.delimiter.get_or_insert(",".to_owned());
+        (dialect.skip, dialect.no_header) = (Some(0), Some(true));
+        return;
+    }
     let mut set = |format: &str, skip: Option<u64>, units_row: bool, skip_after_names: u64, delimiter: &str| {
         if dialect.skip.is_some() || dialect.no_header.is_some() {
             return;
@@ -96,8 +103,50 @@ pub(crate) fn recognise(lines: &[(u64, String)], dialect: &mut Dialect) {
     }
 }
 
+/// Oscilloscopes whose settings stand beside the first rows.
+pub(crate) const TEKTRONIX: &str = "Tektronix";
+/// Number of columns of these settings.
+pub(crate) const SETTINGS: usize = 3;
+
+fn is_tektronix(lines: &[(u64, String)]) -> bool {
+    let is_row = |(_, line): &(u64, String)| {
+        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+        cells.len() > SETTINGS + 1
+            && cells[SETTINGS..SETTINGS + 2]
+                .iter()
+                .all(|cell| cell.parse::<f64>().is_ok())
+    };
+    let first = lines.first().map_or("", |(_, line)| line.trim_start_matches('"'));
+    first.starts_with("Record Length") && lines.iter().all(is_row)
+}
+
+/// Names of columns of formats without a line of names.
+pub(crate) fn names(format: &str, lines: &[(u64, String)], count: usize) -> Vec<String> {
+    let setting = |name: &str| {
+        let found = lines
+            .iter()
+            .find_map(|(_, line)| line.strip_prefix(name)?.strip_prefix(','));
+        found
+            .and_then(|rest| rest.split(',').next())
+            .unwrap_or("")
+            .trim()
+            .to_owned()
+    };
+    let name = |i: usize| match (format, i) {
+        ("EPW", i) => EPW.get(i).copied().unwrap_or("").to_owned(),
+        (TEKTRONIX, i) => match i {
+            0..SETTINGS => ["setting", "setting_value", "setting_unit"][i].to_owned(),
+            3 => "time".to_owned(),
+            4 => setting("Source"),
+            _ => String::new(),
+        },
+        _ => String::new(),
+    };
+    (0..count).map(name).collect()
+}
+
 /// Names of the columns of an EPW file, as far as they are usual.
-pub(crate) const EPW: [&str; 35] = [
+const EPW: [&str; 35] = [
     "year",
     "month",
     "day",

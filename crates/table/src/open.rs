@@ -300,16 +300,7 @@ fn of_text(
             let mut widths = width();
             widths.sort_unstable();
             let width = widths.get(widths.len() / 2).copied().unwrap_or(0);
-            let is_epw = dialect.format.as_deref() == Some("EPW");
-            (0..width)
-                .map(|i| {
-                    if is_epw {
-                        known::EPW.get(i).copied().unwrap_or("").to_owned()
-                    } else {
-                        String::new()
-                    }
-                })
-                .collect()
+            known::names(dialect.format.as_deref().unwrap_or(""), &head.lines, width)
         }
         None => Vec::new(),
     };

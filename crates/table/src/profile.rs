@@ -46,6 +46,8 @@ pub struct Profile {
     whole: Option<(i64, i64)>,
     /// Largest number of decimals.
     pub decimals: u8,
+    /// Whether some date has a day first that is no month, and whether some has one in the second place.
+    days: (bool, bool),
     /// The first cell that is no number.
     pub first_text: Option<(Place, String)>,
     pub(crate) sample: Vec<String>,
@@ -211,6 +213,10 @@ impl Profile {
             return;
         } else if guess::looks_like_time(cell) {
             self.times += 1;
+            if let Some(([first, second, _], _)) = guess::three(cell) {
+                self.days.0 |= (13..=31).contains(&first);
+                self.days.1 |= (13..=31).contains(&second);
+            }
             return;
         } else if number::looks_like_number(cell) {
             self.faults += 1;
@@ -322,6 +328,16 @@ impl Profile {
         self.numbers + self.integers + self.booleans + self.times + self.texts + self.faults
     }
 
+    /// Order of day and month that the dates of the column decide, as `--time-format` says it: `dmy` if some have a first number beyond
+    /// 12, `mdy` if some have such a second one. `None` if none has, or both occur.
+    pub fn day_order(&self) -> Option<&'static str> {
+        match self.days {
+            (true, false) => Some("dmy"),
+            (false, true) => Some("mdy"),
+            _ => None,
+        }
+    }
+
     /// Number of gaps.
     pub fn gaps(&self) -> u64 {
         self.missing.values().sum()
@@ -331,6 +347,8 @@ impl Profile {
     pub fn suspicious(&self) -> u64 {
         match self.kind() {
             Kind::Number | Kind::Integer => self.faults + self.texts + self.booleans + self.times,
+            // Too many different numbers to be words.
+            Kind::Words | Kind::Text if self.texts == 0 && self.booleans > 0 => self.numbers + self.integers,
             Kind::Time => self.faults + self.texts + self.booleans + self.numbers + self.integers,
             _ => 0,
         }

@@ -52,7 +52,7 @@ impl Table {
             };
             batch.cut();
             let is_of_row = error.place().is_some();
-            if is_of_row && self.is_repeated() {
+            if is_of_row && self.rows.is_preamble(&self.row) {
                 self.skipped.repeated += 1;
             } else if is_of_row && self.skipped.bad < self.dialect.skip_bad {
                 self.skip(&error);
@@ -148,10 +148,6 @@ impl Table {
         if self.skipped.faults.len() < MAX_FAULTS {
             self.skipped.faults.push(error.to_string());
         }
-    }
-
-    fn is_repeated(&self) -> bool {
-        self.rows.is_preamble(&self.row)
     }
 
     /// An error of a line with the number of its row.
@@ -294,7 +290,9 @@ impl Table {
         } else {
             mend
         };
-        // The option with the name of this column.
+        if let Some(mend) = self.readings_mend(column, mend) {
+            return self.refused(column, cell, problem, mend);
+        }
         let name = names::quoted(&printable(&self.columns[column].name));
         self.refused(column, cell, problem, mend.replace("--without", &format!("--without {name}")))
     }

@@ -4,6 +4,7 @@ use crate::clock;
 use crate::column::{Column, Kind};
 use crate::dialect::Dialect;
 use crate::error::{Error, listed, printable};
+use crate::known;
 use crate::lines::Row;
 use crate::missing::Spellings;
 use crate::names;
@@ -76,6 +77,8 @@ impl Table {
             thousands: dialect.thousands.map(byte),
         };
         let count = columns.len();
+        let has_settings = dialect.format.as_deref() == Some(known::TEKTRONIX);
+        let first = if has_settings { known::SETTINGS } else { 0 };
         let mut table = Self {
             gaps: columns
                 .iter()
@@ -91,7 +94,7 @@ impl Table {
             is_fixed: vec![false; count],
             has_limits: Vec::new(),
             clocks: vec![None; count],
-            selected: (0..count).collect(),
+            selected: (first.min(count)..count).collect(),
             time: None,
             label: None,
             values: Vec::new(),

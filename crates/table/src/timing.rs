@@ -2,6 +2,7 @@
 
 use crate::clock;
 use crate::error::{Error, Place, printable};
+use crate::interval;
 use crate::table::Table;
 use crate::time::Scale;
 #[cfg(feature = "parquet")]
@@ -81,7 +82,15 @@ impl Table {
             self.time = Some((columns, Clock::typed(scale, zone)));
             return Ok(());
         }
-        let own: Vec<String> = columns.iter().map(|i| self.columns[*i].own_name.clone()).collect();
+        let own = |i: &usize| {
+            let column = &self.columns[*i];
+            // A row of units states that of the times.
+            match interval::of_name(&format!("t [{}]", column.unit)) {
+                Some(_) if columns.len() == 1 => format!("{} [{}]", column.own_name, column.unit),
+                _ => column.own_name.clone(),
+            }
+        };
+        let own: Vec<String> = columns.iter().map(own).collect();
         let own: Vec<&str> = own.iter().map(String::as_str).collect();
         let length = columns
             .iter()
@@ -130,6 +139,19 @@ impl Table {
         self.time
             .as_ref()
             .map(|(columns, clock)| (columns.as_slice(), clock.scale))
+    }
+
+    /// The name of the only column of the time, without the unit if times are seconds that the column has in another unit: what a column of
+    /// these seconds may be called. `None` if several columns give the time, or none.
+    pub fn time_name(&self) -> Option<&str> {
+        let (columns, clock) = self.time.as_ref()?;
+        let [only] = columns.as_slice() else { return None };
+        let name = self.columns.get(*only)?.name.as_str();
+        match interval::of_name(name).filter(|(unit, _)| *unit != "s" && clock.scale == Scale::Seconds) {
+            Some((_, "")) => Some("time"),
+            Some((_, rest)) => Some(rest),
+            None => Some(name),
+        }
     }
 
     /// Lets times be off by so much: decimals beyond the 18th are cut if it is not 0, and a leap second becomes the next second if it is a

@@ -3,6 +3,7 @@
 use crate::calendar;
 use crate::civil::{self, Zone, offset};
 pub(crate) use crate::civil::{NO_SUCH_DATE, Order, Problem};
+use crate::interval;
 use crate::parts::{Part, joined, padded};
 use crate::quick;
 use crate::time::{DECIMALS, SECOND, Scale, Time, Unit};
@@ -52,6 +53,7 @@ const DOUBTFUL: Problem = (
 );
 pub(crate) const AMBIGUOUS: Problem =
     ("may have the day or the month first", "say --time-format dmy or --time-format mdy");
+pub(crate) const YEAR: Problem = ("may have the year first or last", "say --time-format ymd, dmy or mdy");
 
 /// A plain number of units as attoseconds.
 fn number(text: &str, unit: Unit) -> Result<Time, Problem> {
@@ -80,7 +82,7 @@ fn number(text: &str, unit: Unit) -> Result<Time, Problem> {
     Ok(Time(if negative { -ticks } else { ticks }))
 }
 
-/// Formats of numbers of days or seconds since a zero other than 1970: the seconds of a unit, those of the zero since 1970, the scale.
+/// Formats of numbers of units other than parts of a second since 1970: the seconds of a unit, those of the zero since 1970, the scale.
 pub(crate) fn since(format: &str) -> Option<(Syntax, Scale)> {
     let days = |days: i64| Syntax::Since(86_400, -days * 86_400);
     Some(match format {
@@ -89,7 +91,7 @@ pub(crate) fn since(format: &str) -> Option<(Syntax, Scale)> {
         "mjd" => (days(40_587), Scale::Utc),
         "jd" => (Syntax::Since(86_400, -210_866_760_000), Scale::Utc),
         "labview" => (Syntax::Since(1, -2_082_844_800), Scale::Utc),
-        _ => return None,
+        unit => (Syntax::Since(interval::seconds(unit)?, 0), Scale::Seconds),
     })
 }
 

@@ -8,6 +8,7 @@ mod design;
 mod doors;
 mod fit;
 mod fleet;
+mod fresh;
 mod kills;
 mod language;
 mod links;

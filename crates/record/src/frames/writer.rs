@@ -71,6 +71,16 @@ impl FrameWriter {
         self.sent_header().map(Header::to_bytes)
     }
 
+    /// The header as at the beginning of a recording, also before the first frame: a stream of no rows is this header.
+    pub fn header_at_once(&self) -> Vec<u8> {
+        self.header().unwrap_or_else(|| {
+            let ranges = vec![0.0; self.schema.columns.len()];
+            Header::new(self.schema.clone(), &[], ranges)
+                .with_form(Form::Stream)
+                .to_bytes()
+        })
+    }
+
     fn sent_header(&self) -> Option<&Header> {
         self.header.as_ref().filter(|_| self.has_sent)
     }

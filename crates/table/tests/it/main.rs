@@ -4,6 +4,7 @@
 
 mod dialects;
 mod faults;
+mod fresh;
 mod kinds;
 mod limits;
 mod loggers;

@@ -1,0 +1,116 @@
+//! Units of times in names of columns, as of `time_ms`, `Time [us]`, `elapsedMs` and `t/h`.
+
+use crate::time::Unit;
+
+/// Unit of times that are numbers, as `--time-format` says it.
+const WORDS: [(&str, &[&str]); 7] = [
+    ("s", &["s", "sec", "secs", "second", "seconds"]),
+    ("ms", &["ms", "msec", "msecs", "millis", "millisecond", "milliseconds"]),
+    (
+        "us",
+        &[
+            "us",
+            "µs",
+            "μs",
+            "usec",
+            "usecs",
+            "micros",
+            "microsecond",
+            "microseconds",
+        ],
+    ),
+    ("ns", &["ns", "nsec", "nsecs", "nanos", "nanosecond", "nanoseconds"]),
+    ("min", &["min", "mins", "minute", "minutes"]),
+    ("h", &["h", "hr", "hrs", "hour", "hours"]),
+    ("d", &["days"]),
+];
+
+/// Where the last word of a name begins, and where it ends.
+fn last_word(name: &str) -> (usize, usize) {
+    let end = name.trim_end_matches(|c: char| !c.is_alphanumeric()).len();
+    let begin = name[..end]
+        .rfind(|c: char| !c.is_alphanumeric())
+        .map_or(0, |at| at + name[at..].chars().next().map_or(1, char::len_utf8));
+    // `elapsedMs`: a capital behind a small letter begins a word.
+    let word = &name[begin..end];
+    let capital = word
+        .char_indices()
+        .zip(word.chars().skip(1).zip(word.char_indices().skip(1)))
+        .filter(|((_, before), (next, _))| before.is_lowercase() && next.is_uppercase())
+        .map(|(_, (_, (at, _)))| begin + at)
+        .last();
+    (capital.unwrap_or(begin), end)
+}
+
+/// The unit that the last word of a name states, as `--time-format` says it, and the name without it.
+pub(crate) fn of_name(name: &str) -> Option<(&'static str, &str)> {
+    let (begin, end) = last_word(name);
+    let word = name[begin..end].to_lowercase();
+    let in_brackets = name[..begin].ends_with(['(', '[']);
+    let (unit, _) = WORDS
+        .iter()
+        .find(|(unit, words)| words.contains(&word.as_str()) || (in_brackets && (*unit == word || word == "day")))?;
+    let rest = name[..begin].trim_end_matches([' ', '_', '-', '.', ',', '(', '[', '/', ':']);
+    // `in` of `time in ms` belongs to the unit.
+    let rest = rest.strip_suffix(" in").or(rest.strip_suffix("_in")).unwrap_or(rest);
+    Some((*unit, rest))
+}
+
+/// The seconds of a unit that is longer than a second.
+pub(crate) fn seconds(unit: &str) -> Option<i64> {
+    match unit {
+        "min" => Some(60),
+        "h" => Some(3600),
+        "d" => Some(86_400),
+        _ => None,
+    }
+}
+
+/// A second or a part of one.
+pub(crate) fn part(unit: &str) -> Option<Unit> {
+    match unit {
+        "s" => Some(Unit::Seconds),
+        "ms" => Some(Unit::Milliseconds),
+        "us" => Some(Unit::Microseconds),
+        "ns" => Some(Unit::Nanoseconds),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_the_last_words_of_names() {
+        for (name, unit, rest) in [
+            ("time_ms", "ms", "time"),
+            ("Time (ms)", "ms", "Time"),
+            ("t_us", "us", "t"),
+            ("Zeit [µs]", "us", "Zeit"),
+            ("elapsedMs", "ms", "elapsed"),
+            ("t/ns", "ns", "t"),
+            ("time in h", "h", "time"),
+            ("Time [d]", "d", "Time"),
+            ("millis", "ms", ""),
+            ("time_min", "min", "time"),
+            ("t(s)", "s", "t"),
+        ] {
+            assert_eq!(of_name(name), Some((unit, rest)), "{name}");
+        }
+        for name in [
+            "time",
+            "timestamp",
+            "items",
+            "date",
+            "x_d",
+            "runs",
+            "",
+            "()",
+            "day",
+            "ts",
+        ] {
+            assert_eq!(of_name(name), None, "{name}");
+        }
+    }
+}
