@@ -90,6 +90,9 @@ struct Taken {
 
 impl Taken {
     fn of(given: &Given, time: Option<&str>) -> Outcome<Self> {
+        if let Some(time) = time {
+            given.kind(time)?;
+        }
         let names: Vec<String> = given
             .names()
             .into_iter()
@@ -99,7 +102,12 @@ impl Taken {
             .iter()
             .find(|name| matches!(given.kind(name), Ok(DataType::Timestamp(..) | DataType::Date32 | DataType::Date64)))
         {
-            let expected = "numbers: name the column of times in `time`, and leave out others";
+            let expected = match stamps.starts_with("__index_level_") {
+                true => {
+                    "numbers: name the column of times in `time`; `frame.rename_axis(\"time\")` gives pandas' index a name"
+                }
+                false => "numbers: name the column of times in `time`, and leave out others",
+            };
             return refused("column", format!("'{stamps}' of times"), expected);
         }
         let (mut columns, mut whole) = (Vec::with_capacity(names.len()), Vec::with_capacity(names.len()));

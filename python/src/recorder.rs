@@ -15,7 +15,7 @@ use std::path::PathBuf;
 /// Writes a recording row by row. After a crash the rows up to the last `sync` can be read, with `damage="skip"`.
 ///
 /// `bounds` has the bound of each column, as in `write`. `decimals` are those of the seconds of times (3: milliseconds); None numbers the
-/// rows instead. With `resume` an existing recording is continued, with its own columns and bounds.
+/// rows instead. `time` names their column ("time" if left out). With `resume` an existing recording is continued, with its own columns and bounds.
 ///
 /// >>> import fewbits as fb, tempfile, os
 /// >>> path = os.path.join(tempfile.mkdtemp(), "live.fewb")
@@ -32,10 +32,12 @@ pub(crate) struct Recorder {
 #[pymethods]
 impl Recorder {
     #[new]
-    #[pyo3(signature = (path, bounds=None, *, decimals=None, utc=false, effort="thorough", resume=false))]
+    #[pyo3(signature = (path, bounds=None, *, time=None, decimals=None, utc=false, effort="thorough", resume=false))]
+    #[allow(clippy::too_many_arguments)]
     fn new(
         path: PathBuf,
         bounds: Option<&Bound<'_, PyDict>>,
+        time: Option<&str>,
         decimals: Option<u8>,
         utc: bool,
         effort: &str,
@@ -43,7 +45,14 @@ impl Recorder {
     ) -> Outcome<Self> {
         let effort = crate::codec::effort(effort)?;
         let recorder = match (bounds, resume) {
-            (None, true) => fewbits_record::Recorder::resume(&path)?,
+            (None, true) => {
+                let recorder = fewbits_record::Recorder::resume(&path)?;
+                if let Some(time) = time.filter(|time| *time != recorder.schema().time_name()) {
+                    let expected = format!("'{}', as in the recording", recorder.schema().time_name());
+                    return refused("time", format!("'{time}'"), expected);
+                }
+                recorder
+            }
             (Some(bounds), false) => {
                 let names: Vec<String> = bounds
                     .keys()
@@ -53,7 +62,14 @@ impl Recorder {
                 let stated: Stated = bounds.extract()?;
                 let ranges = vec![None; names.len()];
                 let columns = bounds::columns(&names, &stated.of(&names)?, &ranges)?;
-                let time = match decimals {
+                let base = match decimals {
+                    None if time.is_some() => {
+                        return refused(
+                            "time",
+                            "given without `decimals`",
+                            "both: rows that are numbered have no times",
+                        );
+                    }
                     None => TimeBase::Numbered,
                     Some(decimals) if decimals <= MAX_DECIMALS => TimeBase::Clock {
                         decimals,
@@ -62,7 +78,8 @@ impl Recorder {
                     },
                     Some(decimals) => return refused("decimals", decimals, format!("0 to {MAX_DECIMALS}, or None")),
                 };
-                fewbits_record::Recorder::create(&path, Schema::new(columns, time)?)?
+                let schema = Schema::new(columns, base)?.with_time_name(time.unwrap_or_default())?;
+                fewbits_record::Recorder::create(&path, schema)?
             }
             _ => return refused("bounds", "given with `resume`, or neither is", "one of the two"),
         };

@@ -254,3 +254,75 @@ def test_more_rows_than_memory_are_refused():
         frame = whole[:12] + struct.pack("<Q", rows) + whole[20:-4]
         with pytest.raises(fb.DecodeError, match="memory"):
             fb.decode(frame + struct.pack("<I", zlib.crc32(frame)))
+
+
+NO_NUMBERS = {
+    "complex": np.array([1 + 2j]),
+    "times": np.array(["2026-01-01"], dtype="M8[s]"),
+    "durations": np.array([5], dtype="m8[s]"),
+    "texts": np.array(["1.5"]),
+    "texts as objects": np.array(["1.5", 2.0], dtype=object),
+    "times of pandas": pd.Series(pd.date_range("2026-01-01", periods=2, tz="UTC")),
+}
+
+
+@pytest.mark.parametrize("given", NO_NUMBERS.values(), ids=NO_NUMBERS)
+@pytest.mark.parametrize(
+    "use",
+    [
+        fb.encode,
+        lambda x: fb.encode(x, 0.1),
+        lambda x: fb.OneBit(a=0.9, process=0.5, noise=1.0).run(x, mean=0.0, variance=1.0),
+        lambda x: fb.resample(x, seed=1),
+        lambda x: fb.Model.walk(0.1).simulate(x, start=0.0, seed=1),
+        lambda x: fb.design(prior=(0.0, 1.0), noise=[1.0], bits=[1]).encode(np.reshape(x, (-1, 1))),
+    ],
+    ids=["lossless", "bound", "bits", "weights", "vector", "matrix"],
+)
+def test_what_is_no_number_is_refused_and_not_converted(use, given):
+    with pytest.raises(fb.ArgumentError, match="numbers"):
+        use(given)
+
+
+def test_masked_and_missing_cells_are_nan():
+    masked = np.ma.array([1.0, 2.0, 3.0], mask=[0, 1, 0])
+    for bound in (None, 0.1):
+        assert np.isnan(fb.decode(fb.encode(masked, bound))).tolist() == [False, True, False]
+        assert np.isnan(fb.decode(fb.encode(pd.Series([1, None], dtype="Int64"), bound))).tolist() == [False, True]
+        assert np.isnan(fb.decode(fb.encode(np.ma.array([1, 2], mask=[1, 0]), bound))).tolist() == [True, False]
+    assert fb.decode(fb.encode(pd.Series([1, 2**62 + 1], dtype="Int64")))[1] == 2**62 + 1
+    run = fb.OneBit(a=0.9, process=0.5, noise=1.0).run(masked, mean=0.0, variance=1.0)
+    assert run.bits.tolist()[1] == 0
+    with pytest.raises(fb.ArgumentError, match="samples"):
+        fb.design(prior=(0.0, 1.0), noise=[1.0], bits=[1]).encode(masked.reshape(-1, 1))
+
+
+@pytest.mark.parametrize("bits", [[0.5], [257], [1, -1.5], np.array([3e9])])
+def test_whole_numbers_are_not_cut(bits):
+    with pytest.raises(fb.ArgumentError, match="bits"):
+        fb.OneBit(a=0.9, process=0.5, noise=1.0).run_bits(bits, mean=0.0, variance=1.0)
+
+
+def test_words_and_samples_of_a_design_are_rows():
+    design = fb.design(prior=(0.0, 1.0), noise=[1.0, 1.0], bits=[1, 2])
+    words = design.encode(pd.DataFrame({"a": [0.3, -2.0], "b": [0.1, 1.0]}))
+    assert design.decode(words.astype(np.uint8)).tolist() == design.decode(words).tolist() == design.decode(words.astype(float)).tolist()
+    for wrong in ([0.3, 0.1], [[0.3]], [[0.3, 0.1, 0.2]], None, "ab", [[0.3, np.nan]], [[0.3, None]]):
+        with pytest.raises(fb.ArgumentError, match="argument `samples`"):
+            design.encode(wrong)
+    for wrong in ([0, 1], [[0]], None, [[0.5, 0]], [[-1, 0]], [[0, 4]], [[2**63, 0]]):
+        with pytest.raises(fb.ArgumentError, match="argument `words`"):
+            design.decode(wrong)
+    assert design.encode(np.zeros((0, 2))).shape == (0, 2) and design.decode(np.zeros((0, 2), int)).shape == (0,)
+
+
+def test_bytes_come_in_any_buffer():
+    frame = fb.encode([1.5, 2.5])
+    for given in (bytearray(frame), memoryview(frame), np.frombuffer(frame, np.uint8), memoryview(b"_" + frame)[1:]):
+        assert fb.decode(given).tolist() == [1.5, 2.5]
+    assert fb.FusionCentre.from_bytes(bytearray(centre().to_bytes())).sensors["name"].tolist() == ["a"]
+    for wrong in ("x", None, 3, [1]):
+        with pytest.raises(fb.ArgumentError, match="argument `frame`"):
+            fb.decode(wrong)
+    with pytest.raises(fb.ArgumentError, match="argument `bound` is ±0.1"):
+        fb.encode([1.0], "±0.1")

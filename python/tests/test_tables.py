@@ -352,3 +352,75 @@ def test_dates_decimals_and_durations_are_taken(tmp_path):
     centre.join("price", noise=0.05)
     result = centre.run(table, time="day")
     assert len(result) == 40 and abs(result["x0"][-1] - 20.5) < 0.2
+
+
+def test_a_live_centre_goes_on_from_timestamps():
+    stamps = pd.date_range("2026-01-01", periods=4, freq="10min", tz="UTC", name="when")
+    frame = pd.DataFrame({"a": [1.0, 1.2, 0.9, 1.4]}, index=stamps)
+
+    def centre():
+        made = fb.FusionCentre(fb.Model.walk(1e-4), mean=0.0, deviation=1.0)
+        made.join("a", noise=0.3, send="bit")
+        return made
+
+    whole, live, steps = centre(), centre(), centre()
+    expected = whole.run(frame, time="when")["x0"][-1]
+    live.run(frame.iloc[:3], time="when")
+    steps.step("2026-01-01T00:00:00", {"a": 1.0})
+    steps.step(np.datetime64("2026-01-01T00:10"), {"a": 1.2})
+    steps.step(stamps[2].tz_convert("Asia/Kolkata"), {"a": 0.9})
+    for one in (live, fb.FusionCentre.from_bytes(live.to_bytes()), steps):
+        assert one.step(stamps[3].to_pydatetime(), {"a": 1.4}).mean[0] == expected
+    with pytest.raises(fb.ArgumentError, match="timestamps, as in the runs before"):
+        live.step(5.0, {"a": 1.0})
+    seconds = centre()
+    seconds.step(0.0, {"a": 1.0})
+    for wrong in (stamps[0], "2026-01-01"):
+        with pytest.raises(fb.ArgumentError, match="seconds, as in the runs before"):
+            seconds.step(wrong, {"a": 1.0})
+    for wrong in (pd.NaT, "yesterday", None):
+        with pytest.raises(fb.ArgumentError, match="time"):
+            live.step(wrong, {"a": 1.0})
+
+
+@pytest.mark.parametrize("utc", [True, False])
+def test_a_recorder_names_its_times(tmp_path, utc):
+    path = tmp_path / "a.fewb"
+    times = pd.date_range("2026-01-01", periods=3, tz="UTC", name="when") if utc else [0.5, 1.0, 2.5]
+    frame = pd.DataFrame({"x": [1.0, np.nan, 3.0], "other": ["a", "b", "c"]}, index=pd.Index(times, name="when"))
+    with fb.Recorder(path, {"x": "lossless"}, time="when", decimals=1, utc=utc) as recorder:
+        recorder.push_table(frame.iloc[:2])
+        recorder.push_table(pl.DataFrame(frame[["x"]].reset_index())[2:])
+    assert fb.read(path).columns == ["when", "x"] and fb.verify(frame[["x"]], path, time="when")["holds"]
+    # The name stays when the recording is continued, and another one is refused.
+    with pytest.raises(fb.ArgumentError, match="'when', as in the recording"):
+        fb.Recorder(path, time="at", resume=True)
+    later = pd.date_range("2026-01-05", periods=1, tz="UTC") if utc else [3.0]
+    with fb.Recorder(path, time="when", resume=True) as recorder:
+        recorder.push_table(pa.table({"x": [4.0], "when": pa.array(later)}))
+        with pytest.raises(fb.ArgumentError, match="'time': expected one of"):
+            recorder.push_table(pa.table({"x": [4.0], "at": pa.array(later)}))
+    assert fb.read(path)["x"].tolist()[-1] == 4.0 and len(fb.read(path)) == 4
+    with pytest.raises(fb.ArgumentError, match="given without `decimals`"):
+        fb.Recorder(tmp_path / "b.fewb", {"x": 1}, time="when")
+
+
+def test_tables_that_cannot_be_read_are_named(tmp_path):
+    def refused(table, text, **given):
+        with pytest.raises(fb.ArgumentError, match=text):
+            fb.write(table, tmp_path / "a.fewb", **given)
+
+    column = pd.Series([1.0], name="x")
+    refused(column, "to_frame")
+    refused(pl.Series("x", [1.0]), "to_frame")
+    refused(pl.DataFrame({"x": pl.Series([2**100], dtype=pl.Int128)}), "columns that can be read")
+    # polars hands nulls without a type on as no other library does.
+    for nothing in (pl.DataFrame({"x": [1.0], "y": [None]}), pa.table({"x": [1.0], "y": pa.nulls(1)})):
+        try:
+            fb.write(nothing, tmp_path / "a.fewb")
+            assert np.isnan(fb.read(tmp_path / "a.fewb")["y"]).all()
+        except fb.ArgumentError as error:
+            assert error.name == "column" and "'y' without a type" in error.value
+    stamped = pd.DataFrame({"x": [1.0]}, index=pd.date_range("2026-01-01", periods=1))
+    refused(stamped, "rename_axis")
+    refused(stamped, "rename_axis", time="index")

@@ -77,6 +77,13 @@ impl Ending {
         say!("error: {name}: no whole frame came: use the sender's link, options and baud rate, and wait longer");
         Self::Failed
     }
+
+    /// The end of a task that received no reading in messages of other programs.
+    pub(crate) fn no_reading(name: &str, device: Option<&str>) -> Self {
+        let of = device.map_or_else(String::new, |device| format!(" of device `{device}`"));
+        say!("error: {name}: no reading came: no message{of} had one in a form of `--format`");
+        Self::Failed
+    }
 }
 
 fn run(mut task: Task) -> Result<Ending, Error> {

@@ -74,7 +74,7 @@ pub(crate) fn run(options: &ReceiveOptions, format: Format) -> Result<Ending, Er
         crate::say::say!("warning: {name}: {refused} messages were not used");
     }
     Ok(match (rows, refused) {
-        (0, _) => Ending::no_frame(&name),
+        (0, _) => Ending::no_reading(&name, options.device.as_deref()),
         (_, 0) => Ending::Good,
         _ => Ending::Failed,
     })

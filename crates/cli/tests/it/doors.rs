@@ -50,6 +50,30 @@ fn cayenne_payloads_of_a_lorawan_server_are_rows() {
     assert!(said.contains("cannot be used with"), "{said}");
 }
 
+/// What other programs send has no baud rate: it was advised to change it.
+#[test]
+fn messages_without_a_reading_are_said_to_have_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let join = r#"{"deviceInfo":{"devEui":"0101010101010101"},"devAddr":"00189440"}"#;
+    for (words, input, expected) in [
+        (&["--format", "lorawan"][..], "not json\n", "no message had one"),
+        (&["--format", "lorawan"], join, "no message had one"),
+        (&["--format", "lorawan", "--device", "02"], join, "no message of device `02` had one"),
+        (&["--format", "senml"], r#"[{"bver":11,"n":"a","v":1}]"#, "`SenML version` is 11: expected"),
+        (&["--format", "senml"], r#"[{"bver":"x","n":"a","v":1}]"#, "`SenML version` is \"x\": expected"),
+        (&["--format", "senml"], "[]", "no reading came"),
+        (&["--format", "senml-cbor"], "", "no reading came"),
+    ] {
+        let output = fewbits(folder.path(), &[&["receive"], words].concat(), input.as_bytes());
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{input}: {said}");
+        assert!(
+            said.contains(expected) && said.contains("no reading came") && !said.contains("baud"),
+            "{input}: {said}"
+        );
+    }
+}
+
 /// Lists of RFC 8428, section 5.1.3 in JSON, and the same as CBOR of section 6.
 #[test]
 fn senml_is_rows() {

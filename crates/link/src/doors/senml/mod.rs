@@ -185,7 +185,11 @@ fn resolve_one(base: &mut Base, fields: &Map<String, Json>, now: f64) -> Result<
     if let Some(version) = fields.get("bver").map(Json::as_u64)
         && version.is_none_or(|version| version > VERSION)
     {
-        return refuse("SenML version", format!("{:?}", fields.get("bver")), format!("at most {VERSION}"));
+        return refuse(
+            "SenML version",
+            fields.get("bver").map_or_else(String::new, Json::to_string),
+            format!("at most {VERSION}"),
+        );
     }
     if let Some(name) = text(fields, "bn")? {
         base.name = name.to_owned();
