@@ -2,7 +2,9 @@
 
 use fewbits_core::factor::{Levels, Value};
 use fewbits_core::{Belief, Cell, Gaussian, Likelihood, Observed};
-use fewbits_filters::{BootstrapFilter, Error, MomentFilter, PointMassFilter, ResamplingRule, StateFilter};
+use fewbits_filters::{
+    BootstrapFilter, Error, MomentFilter, PointMassFilter, ResamplingRule, StateFilter, UniformGrid,
+};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
@@ -48,7 +50,8 @@ fn with_values_it_is_the_kalman_filter() {
     }
 }
 
-/// Silence within a cell, again and again: the belief is that of 400 000 particles, whose variance that of Gaussian moments is far below.
+/// Silence within a cell, again and again: the belief is that on a fixed fine grid and that of 400 000 particles, whose variance that of
+/// Gaussian moments is far below.
 #[test]
 fn silence_leaves_the_exact_belief() {
     let world = ContinuousLinear::random_walk(0.0025).unwrap();
@@ -58,16 +61,21 @@ fn silence_leaves_the_exact_belief() {
     let mut cloud = BootstrapFilter::new(ResamplingRule::default(), 400_000).unwrap();
     let mut one = grid.start(&mut rng, &prior).unwrap();
     let mut other = cloud.start(&mut rng, &prior).unwrap();
+    let mut fixed = PointMassFilter::new(UniformGrid::symmetric(3.0, 0.02).unwrap());
+    let (mut fine, mut logs) = (fixed.start(&mut rng, &prior).unwrap(), [0.0; 2]);
     let mut gaussian = prior;
     let cell = Levels::certain(Cell::new(-0.5, 0.5).unwrap(), 0.0025).unwrap();
     let seen = Observed::new(LinearSensor::direct(0.0025).unwrap(), cell);
     for _ in 0..150 {
-        step(&mut grid, &mut rng, &world, &mut one, (1.0, &seen));
+        logs[0] += step(&mut grid, &mut rng, &world, &mut one, (1.0, &seen));
+        logs[1] += step(&mut fixed, &mut rng, &world, &mut fine, (1.0, &seen));
         step(&mut cloud, &mut rng, &world, &mut other, (1.0, &seen));
         step(&mut moments, &mut rng, &world, &mut gaussian, (1.0, &seen));
     }
     let (own, drawn) = (one.variance(), other.covariance()[0]);
     assert!((own / drawn - 1.0).abs() < 0.02 && one.mean().abs() < 1e-9, "{own} {drawn}");
+    assert!((own / fine.variance() - 1.0).abs() < 0.01, "{own} {}", fine.variance());
+    assert!((logs[0] - logs[1]).abs() < 0.05, "{logs:?}");
     assert!(gaussian.covariance()[0] < 0.9 * own, "{gaussian:?} {own}");
     // Draws have the moments.
     let mut states = vec![0.0; 100_000];
