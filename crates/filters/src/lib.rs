@@ -13,7 +13,7 @@
 //! | any dynamics, any likelihood | [`BootstrapFilter`], [`GuidedFilter`] | [`ResamplingRule`], [`Resampling`] |
 //! | linear Gaussian state, any factor of scalars | [`RaoBlackwellised`] (measurements imputed, states exact) | [`impute`] |
 //! | several models, one at a time | [`Imm`] (interacting multiple models) | [`Switching`] (their dynamics) |
-//! | the exact answer for a scalar | [`PointMassFilter`] (any dynamics, fixed grid), [`MovingGridFilter`] (linear dynamics) | [`TransitionKernel`] (its time update) |
+//! | the exact answer for a scalar | [`PointMassFilter`]: on a fixed grid with any dynamics, on one that follows the belief with linear ones | [`TransitionKernel`] (its time update) |
 //! | the exact answer for a few numbers | | [`LatticeKernel`] (independent noise on each) |
 //! | smoothing | | [`smoother`] (Gaussian beliefs: Rauch-Tung-Striebel), [`backward_simulation`] (particles), [`TransitionKernel::smooth`] (a grid) |
 //! | calibration of sensors and level from recorded readings | [`fit`] (maximum likelihood), [`calibration`] (noises and change alone) | |
@@ -72,7 +72,6 @@ pub use guided::{GuidedFilter, GuidedParticles};
 pub use imm::Imm;
 pub use imm_belief::ImmBelief;
 pub use lattice::LatticeKernel;
-pub use moving_grid::{MovingGrid, MovingGridFilter};
 pub use particle::BootstrapFilter;
 pub use point_mass::PointMassFilter;
 pub use rao_blackwell::{RaoBlackwellised, impute};

@@ -1,10 +1,9 @@
-//! The filter of a number on a grid that goes with it.
+//! Steps of a density on a grid that goes with it, as [`PointMassFilter::following`](crate::PointMassFilter::following) takes them.
 
-use crate::contract::{Info, StateFilter};
-use crate::{Error, Points};
-use fewbits_core::{Belief, ColumnsMut, Gaussian, GaussianDynamics, Likelihood};
-use nalgebra::{Matrix1, SMatrix, SVector, Vector1};
-use rand::{Rng, RngExt};
+use crate::Error;
+use fewbits_core::{Belief, Density, Gaussian, GaussianDynamics, Likelihood};
+use fewbits_densities::{PointMass, UniformGrid};
+use nalgebra::Vector1;
 
 /// Nodes of a new grid, and most nodes before it is made coarser.
 const NODES: usize = 241;
@@ -23,65 +22,30 @@ const PASSES: usize = 40;
 const COVERED: f64 = 1e-12;
 const BESIDE: usize = 2;
 
-/// A belief about a number: masses of equidistant nodes.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MovingGrid {
+/// Masses of equidistant nodes, of any sum.
+struct Masses {
     first: f64,
     spacing: f64,
-    /// Of sum one.
     masses: Vec<f64>,
 }
 
-impl MovingGrid {
-    fn of(law: &Gaussian<1>) -> Result<Self, Error> {
-        let (mean, deviation) = (law.mean()[0], law.covariance()[0].sqrt());
-        // What is known for certain is a grid of no width that matters.
-        let deviation = deviation.max(1e-9 * mean.abs()).max(f64::MIN_POSITIVE.sqrt());
-        let half = 0.5 * (NODES as f64 - 1.0);
-        let step = REACH / half;
-        let masses = (0..NODES).map(|i| (-0.5 * ((i as f64 - half) * step).powi(2)).exp());
-        let grid = Self {
-            first: mean - REACH * deviation,
-            spacing: step * deviation,
-            masses: masses.collect(),
-        };
-        grid.normalised().ok_or_else(no_number)
-    }
-
-    fn node(&self, i: usize) -> f64 {
-        self.first + self.spacing * i as f64
-    }
-
-    fn moments(&self) -> (f64, f64) {
-        // From the middle of the grid, so that no digits are lost far from zero.
-        let middle = 0.5 * (self.masses.len() as f64 - 1.0);
-        let at = |i: usize| i as f64 - middle;
-        let sum = |power: i32| -> f64 {
-            let terms = self.masses.iter().enumerate();
-            terms.map(|(i, mass)| mass * at(i).powi(power)).sum()
-        };
-        let (mean, square) = (sum(1), sum(2));
-        let variance = (square - mean * mean).max(0.0);
-        (self.first + self.spacing * (middle + mean), self.spacing * self.spacing * variance)
-    }
-
-    fn normalised(mut self) -> Option<Self> {
-        let sum: f64 = self.masses.iter().sum();
-        if !(sum > 0.0 && sum.is_finite() && self.spacing > 0.0 && self.spacing.is_finite() && self.first.is_finite()) {
-            return None;
-        }
-        self.masses.iter_mut().for_each(|mass| *mass /= sum);
-        Some(self)
+impl Masses {
+    fn belief(&self) -> Result<PointMass, Error> {
+        let mut belief =
+            PointMass::new(UniformGrid::from_nodes(self.first, self.spacing, self.masses.len())?, |_| 0.0)?;
+        belief.refill(|density| density.copy_from_slice(&self.masses))?;
+        Ok(belief)
     }
 
     /// Without the nodes at the ends that have no mass.
     fn cut(mut self) -> Self {
+        let negligible = CUT * self.masses.iter().sum::<f64>();
         let beyond = |masses: &mut dyn Iterator<Item = &f64>| {
             let mut sum = 0.0;
             masses
                 .take_while(|mass| {
                     sum += **mass;
-                    sum < CUT
+                    sum < negligible
                 })
                 .count()
         };
@@ -92,25 +56,6 @@ impl MovingGrid {
             self.first += self.spacing * low as f64;
         }
         self
-    }
-
-    /// The density between nodes, a line from each to the next, on other nodes.
-    fn on(&self, first: f64, spacing: f64, count: usize) -> Self {
-        let last = self.masses.len() - 1;
-        let at = |i: usize| {
-            let place = (first + spacing * i as f64 - self.first) / self.spacing;
-            let below = place.floor();
-            let of = |k: f64| {
-                let is_inside = (0.0..=last as f64).contains(&k);
-                if is_inside { self.masses[k as usize] } else { 0.0 }
-            };
-            (1.0 - (place - below)) * of(below) + (place - below) * of(below + 1.0)
-        };
-        Self {
-            first,
-            spacing,
-            masses: (0..count).map(at).collect(),
-        }
     }
 
     /// On nodes at this larger distance: each mass is shared by the two nodes beside it, so that the mean stays.
@@ -173,132 +118,80 @@ impl MovingGrid {
     }
 }
 
-impl Belief<1> for MovingGrid {
-    fn mean(&self) -> SVector<f64, 1> {
-        Vector1::new(self.moments().0)
-    }
-
-    fn covariance(&self) -> SMatrix<f64, 1, 1> {
-        Matrix1::new(self.moments().1)
-    }
-
-    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, 1>) {
-        let [states] = states;
-        for state in states {
-            let mut left: f64 = rng.random();
-            let node = self.masses.iter().position(|mass| {
-                left -= mass;
-                left < 0.0
-            });
-            let within = rng.random::<f64>() - 0.5;
-            *state = self.first + self.spacing * (node.unwrap_or(self.masses.len() - 1) as f64 + within);
-        }
-    }
+/// The Gaussian on a grid of its own width.
+pub(crate) fn start(law: &Gaussian<1>) -> Result<PointMass, Error> {
+    let (mean, deviation) = (law.mean()[0], law.covariance()[0].sqrt());
+    // What is known for certain is a grid of no width that matters.
+    let deviation = deviation.max(1e-9 * mean.abs()).max(f64::MIN_POSITIVE.sqrt());
+    let half = 0.5 * (NODES as f64 - 1.0);
+    let step = REACH / half;
+    let masses = (0..NODES).map(|i| (-0.5 * ((i as f64 - half) * step).powi(2)).exp());
+    let masses = Masses {
+        first: mean - REACH * deviation,
+        spacing: step * deviation,
+        masses: masses.collect(),
+    };
+    masses.belief()
 }
 
-/// The exact filter of a scalar state with any likelihood and dynamics that are linear over the width of the belief: a grid that follows the
-/// belief, as wide as it is, and as fine as the likelihood asks. For beliefs that are not Gaussian, as after silence has cut them.
-///
-/// ```text
-/// predict:  nodes x <- f(mean) + F (x - mean), then the sum with N(0, Q)
-/// update:   p(x) <- p(x) p(observed | x) / evidence, on a finer grid until the posterior is resolved
-/// ```
-/// [`PointMassFilter`](crate::PointMassFilter) has a fixed grid, and takes dynamics of any shape.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct MovingGridFilter;
-
-fn no_number() -> Error {
-    Error::NotANumber {
-        what: "a mass of the grid",
+/// The belief after dynamics that are linear over its width.
+pub(crate) fn predicted(belief: &PointMass, dynamics: &dyn GaussianDynamics<1>) -> Result<PointMass, Error> {
+    let mean = Belief::mean(belief);
+    let slope = dynamics.jacobian(&mean)[0];
+    let to = dynamics.mean(&mean)[0];
+    let noise = dynamics.noise_covariance_at(&mean);
+    let grid = belief.grid();
+    let spacing = grid.spacing() * slope.abs();
+    // What is forgotten leaves a point.
+    if spacing <= f64::MIN_POSITIVE.sqrt() {
+        return start(&Gaussian::new(Vector1::new(to), noise)?);
     }
+    let mut masses = belief.density().to_vec();
+    let mut first = grid.node(0);
+    if slope < 0.0 {
+        masses.reverse();
+        first = grid.node(masses.len() - 1);
+    }
+    let moved = Masses {
+        first: to + slope * (first - mean[0]),
+        spacing,
+        masses,
+    };
+    moved.with_noise(noise[0]).belief()
 }
 
-impl StateFilter<1> for MovingGridFilter {
-    type Belief = MovingGrid;
-
-    fn start(&mut self, _: &mut dyn Rng, prior: &Gaussian<1>) -> Result<MovingGrid, Error> {
-        MovingGrid::of(prior)
-    }
-
-    fn predict(
-        &mut self,
-        _: &mut dyn Rng,
-        dynamics: &dyn GaussianDynamics<1>,
-        belief: &mut MovingGrid,
-    ) -> Result<(), Error> {
-        let mean = belief.mean();
-        let slope = dynamics.jacobian(&mean)[0];
-        let to = dynamics.mean(&mean)[0];
-        let mut next = belief.clone();
-        if slope < 0.0 {
-            next.masses.reverse();
-            next.first = belief.node(belief.masses.len() - 1);
+/// The posterior on a grid that resolves it, and the log-likelihood of the observations.
+pub(crate) fn updated(belief: &PointMass, observed: &[&dyn Likelihood<1>]) -> Result<(PointMass, f64), Error> {
+    let mut prior = belief.clone();
+    // Logarithm of the mass of the belief that the present grid covers.
+    let mut log_covered = 0.0;
+    let mut pass = 0;
+    loop {
+        let mut posterior = prior.clone();
+        let log_likelihood = posterior.update(observed)?;
+        let (density, h) = (posterior.density(), posterior.grid().spacing());
+        let squares: f64 = density.iter().map(|p| (p * h).powi(2)).sum();
+        let covered = COVERED * density.iter().copied().fold(0.0, f64::max);
+        let is_covered = |p: &f64| *p > covered;
+        let low = density.iter().position(is_covered).unwrap_or(0).saturating_sub(BESIDE);
+        let high = density.iter().rposition(is_covered).unwrap_or(0) + BESIDE;
+        let high = high.min(density.len() - 1);
+        let spacing = h * (high - low) as f64 / (NODES - 1) as f64;
+        // It is resolved, or the grid cannot be finer.
+        if RESOLVED * squares <= 1.0 || pass == PASSES || spacing >= h {
+            let resolved = Masses {
+                first: posterior.grid().node(0),
+                spacing: h,
+                masses: posterior.density().to_vec(),
+            };
+            return Ok((resolved.cut().belief()?, log_covered + log_likelihood));
         }
-        next.first = to + slope * (next.first - mean[0]);
-        next.spacing *= slope.abs();
-        // What is forgotten leaves a point.
-        if next.spacing <= f64::MIN_POSITIVE.sqrt() {
-            let noise = dynamics.noise_covariance_at(&mean);
-            let law = Gaussian::new(Vector1::new(to), noise)?;
-            *belief = MovingGrid::of(&law)?;
-            return Ok(());
-        }
-        let next = next.with_noise(dynamics.noise_covariance_at(&mean)[0]);
-        *belief = next.normalised().ok_or_else(no_number)?;
-        Ok(())
-    }
-
-    fn update(
-        &mut self,
-        _: &mut dyn Rng,
-        belief: &mut MovingGrid,
-        observed: &[&dyn Likelihood<1>],
-    ) -> Result<Info, Error> {
-        let mut prior = belief.clone();
-        let mut pass = 0;
-        loop {
-            let nodes: Vec<f64> = (0..prior.masses.len()).map(|i| prior.node(i)).collect();
-            let mut logs: Vec<f64> = prior.masses.iter().map(|mass| mass.ln()).collect();
-            observed.add_log_likelihoods([&nodes], &mut logs);
-            let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            if !top.is_finite() {
-                return Err(if top == f64::NEG_INFINITY {
-                    Error::Impossible
-                } else {
-                    no_number()
-                });
-            }
-            let masses: Vec<f64> = logs.iter().map(|log| (log - top).exp()).collect();
-            let sum: f64 = masses.iter().sum();
-            let squares: f64 = masses.iter().map(|mass| mass * mass).sum();
-            if sum * sum >= RESOLVED * squares || pass == PASSES {
-                let posterior = MovingGrid { masses, ..prior };
-                *belief = posterior.normalised().ok_or_else(no_number)?.cut();
-                return Ok(Info::new(top + sum.ln()));
-            }
-            pass += 1;
-            let is_covered = |mass: &f64| *mass > COVERED;
-            let low = masses.iter().position(is_covered).unwrap_or(0).saturating_sub(BESIDE);
-            let high = masses.iter().rposition(is_covered).unwrap_or(0) + BESIDE;
-            let high = high.min(masses.len() - 1);
-            let spacing = prior.spacing * (high - low) as f64 / (NODES - 1) as f64;
-            if spacing >= prior.spacing {
-                // It cannot be finer.
-                pass = PASSES;
-                continue;
-            }
-            let mut finer = prior.on(prior.node(low), spacing, NODES);
-            // Masses of nodes that are closer are smaller.
-            let share = spacing / prior.spacing;
-            finer.masses.iter_mut().for_each(|mass| *mass *= share);
-            prior = finer;
-        }
-    }
-
-    fn points(&self, belief: &MovingGrid) -> Option<Points<1>> {
-        Some(Points {
-            states: [(0..belief.masses.len()).map(|i| belief.node(i)).collect()],
-            log_weights: belief.masses.iter().map(|mass| mass.ln()).collect(),
-        })
+        let grid = UniformGrid::from_nodes(prior.grid().node(low), spacing, NODES)?;
+        // The density between nodes is a line from each to the next.
+        let mut finer = PointMass::new(grid, |_| 0.0)?;
+        let mean_density = finer.update_with(|x| prior.log_density(&Vector1::new(x)))?;
+        log_covered += mean_density + (grid.spacing() * NODES as f64).ln();
+        prior = finer;
+        pass += 1;
     }
 }

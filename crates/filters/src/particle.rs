@@ -81,6 +81,7 @@ impl<const D: usize> BootstrapFilter<D> {
         change: impl FnOnce(&mut dyn Rng, ColumnsMut<'_, D>) -> Result<(), E>,
         weigh: impl FnOnce(Columns<'_, D>, &mut [f64]) -> Result<(), E>,
     ) -> Result<Info, E> {
+        // Everything happens in a second buffer, so that the belief is unchanged if a later part fails.
         let next = self.next.get_or_insert_with(|| belief.clone());
         if self.rule.draw_ancestors(rng, belief, &mut self.ancestors) {
             next.select_from(belief, &self.ancestors)?;
@@ -108,17 +109,14 @@ impl<const D: usize> BootstrapFilter<D> {
         belief: &mut Particles<D>,
         observed: &[&dyn Likelihood<D>],
     ) -> Result<Info, Error> {
-        // Everything happens in a second buffer, so that the belief is unchanged if a later part fails.
-        let next = self.next.get_or_insert_with(|| belief.clone());
-        if self.rule.draw_ancestors(rng, belief, &mut self.ancestors) {
-            next.select_from(belief, &self.ancestors)?;
-        } else {
-            next.clone_from(belief);
-        }
-        dynamics.propagate_columns(rng, next.columns_mut());
-        let info = weigh(next, |states, logs| observed.add_log_likelihoods(states, logs))?;
-        std::mem::swap(belief, next);
-        Ok(info)
+        let change = |rng: &mut dyn Rng, states: ColumnsMut<'_, D>| {
+            dynamics.propagate_columns(rng, states);
+            Ok(())
+        };
+        self.step_by(rng, belief, change, |states, logs| {
+            observed.add_log_likelihoods(states, logs);
+            Ok(())
+        })
     }
 }
 

@@ -1,34 +1,56 @@
-//! An exact scalar filter on a grid, the reference for approximate filters.
+//! The exact filter of a number on a grid, the reference for approximate filters.
 
 use crate::contract::{Info, StateFilter};
+use crate::moving_grid;
 use crate::transition_kernel::{TransitionKernel, moved};
 use crate::{Error, Points};
 use fewbits_core::{Gaussian, GaussianDynamics, Likelihood};
 use fewbits_densities::{PointMass, UniformGrid};
 use rand::Rng;
 
-/// The exact filter of a scalar state with any likelihood, on a fixed grid, for any dynamics that the grid resolves. The transition density
-/// is a [`TransitionKernel`], which is kept while the dynamics stay the same.
+/// The exact filter of a scalar state with any likelihood, on one of two kinds of grid.
+///
+/// [`new`](Self::new): a fixed grid, for any dynamics that it resolves. The transition density is a [`TransitionKernel`], which is kept while
+/// the dynamics stay the same.
 ///
 /// ```text
 /// predict:  p(x) <- h sum_y N(x; f(y), Q(y)) p(y)
 /// update:   p(x) <- p(x) p(observed | x) / evidence
 /// ```
+///
+/// [`following`](Self::following): a grid that goes with the belief, as wide as it is, and as fine as the likelihood asks; for dynamics that
+/// are linear over the width of the belief. For beliefs that are not Gaussian, as after silence has cut them.
+///
+/// ```text
+/// predict:  nodes x <- f(mean) + F (x - mean), then the sum with N(0, Q)
+/// update:   p(x) <- p(x) p(observed | x) / evidence, on a finer grid until the posterior is resolved
+/// ```
 #[derive(Debug, Clone)]
-pub struct PointMassFilter {
-    grid: UniformGrid,
-    moved: Vec<(f64, f64)>,
-    kernel: Option<TransitionKernel>,
+pub struct PointMassFilter(Region);
+
+#[derive(Debug, Clone)]
+enum Region {
+    Fixed {
+        grid: UniformGrid,
+        moved: Vec<(f64, f64)>,
+        kernel: Option<TransitionKernel>,
+    },
+    Following,
 }
 
 impl PointMassFilter {
     /// The filter on this grid.
     pub fn new(grid: UniformGrid) -> Self {
-        Self {
+        Self(Region::Fixed {
             grid,
             moved: Vec::new(),
             kernel: None,
-        }
+        })
+    }
+
+    /// The filter on a grid that follows the belief.
+    pub fn following() -> Self {
+        Self(Region::Following)
     }
 }
 
@@ -36,7 +58,10 @@ impl StateFilter<1> for PointMassFilter {
     type Belief = PointMass;
 
     fn start(&mut self, _: &mut dyn Rng, prior: &Gaussian<1>) -> Result<PointMass, Error> {
-        PointMass::normal(self.grid, prior.mean()[0], prior.covariance()[0])
+        match &self.0 {
+            Region::Fixed { grid, .. } => PointMass::normal(*grid, prior.mean()[0], prior.covariance()[0]),
+            Region::Following => moving_grid::start(prior),
+        }
     }
 
     fn predict(
@@ -45,13 +70,22 @@ impl StateFilter<1> for PointMassFilter {
         dynamics: &dyn GaussianDynamics<1>,
         belief: &mut PointMass,
     ) -> Result<(), Error> {
-        let moved = moved(&self.grid, dynamics);
-        let kernel = match self.kernel.take().filter(|_| self.moved == moved) {
-            Some(kernel) => kernel,
-            None => TransitionKernel::resolving(self.grid, &moved)?,
-        };
-        *belief = kernel.predict(belief)?;
-        (self.moved, self.kernel) = (moved, Some(kernel));
+        match &mut self.0 {
+            Region::Fixed {
+                grid,
+                moved: known,
+                kernel,
+            } => {
+                let next = moved(grid, dynamics);
+                let used = match kernel.take().filter(|_| *known == next) {
+                    Some(kernel) => kernel,
+                    None => TransitionKernel::resolving(*grid, &next)?,
+                };
+                *belief = used.predict(belief)?;
+                (*known, *kernel) = (next, Some(used));
+            }
+            Region::Following => *belief = moving_grid::predicted(belief, dynamics)?,
+        }
         Ok(())
     }
 
@@ -61,7 +95,14 @@ impl StateFilter<1> for PointMassFilter {
         belief: &mut PointMass,
         observed: &[&dyn Likelihood<1>],
     ) -> Result<Info, Error> {
-        Ok(Info::new(belief.update(observed)?))
+        match &self.0 {
+            Region::Fixed { .. } => Ok(Info::new(belief.update(observed)?)),
+            Region::Following => {
+                let (posterior, log_likelihood) = moving_grid::updated(belief, observed)?;
+                *belief = posterior;
+                Ok(Info::new(log_likelihood))
+            }
+        }
     }
 
     fn points(&self, belief: &PointMass) -> Option<Points<1>> {

@@ -47,7 +47,7 @@ pub fn smooth_step<const D: usize>(
 ///
 /// # Errors
 /// If a covariance is not positive semidefinite, or a moment of the result not finite.
-pub fn smooth_along<const D: usize>(
+pub(crate) fn smooth_along<const D: usize>(
     dynamics: &dyn GaussianDynamics<D>,
     filtered: &Gaussian<D>,
     smoothed_next: &Gaussian<D>,

@@ -9,7 +9,7 @@ use fewbits_numerics::quadrature::gauss_legendre;
 const INFORMATION_PANEL: f64 = 0.5;
 
 /// Mean Fisher information `E[J(X)]` of the bits about the source.
-pub fn mean_information(bank: &Bank) -> f64 {
+pub(crate) fn mean_information(bank: &Bank) -> f64 {
     let reach = bank.source().reach();
     Nodes::adapted(bank.source(), -reach, reach, &bank.thresholds(), INFORMATION_PANEL, gauss_legendre::<12>())
         .expectation(|x| bank.fisher_information(x))

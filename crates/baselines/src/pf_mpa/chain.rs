@@ -124,7 +124,7 @@ fn times(row: &[f64; 3], matrix: &[[f64; 3]; 3]) -> [f64; 3] {
 }
 
 /// One of three values, with the probabilities `law`.
-pub fn draw<R: Rng + ?Sized>(rng: &mut R, law: &[f64; 3], values: &[f64; 3]) -> f64 {
+pub(crate) fn draw<R: Rng + ?Sized>(rng: &mut R, law: &[f64; 3], values: &[f64; 3]) -> f64 {
     let u: f64 = rng.random();
     if u < law[0] {
         values[0]

@@ -16,7 +16,7 @@ const LOG_IMPOSSIBLE: f64 = -1e12;
 ///
 /// # Errors
 /// If there is no such group, or it has several sensors.
-pub fn single_sensor(system: &System, group: usize) -> Result<&SensorGroup, Error> {
+pub(crate) fn single_sensor(system: &System, group: usize) -> Result<&SensorGroup, Error> {
     match system.groups().get(group) {
         Some(entry) if entry.sensors().len() == 1 => Ok(entry),
         Some(entry) => refuse("group", format!("{} sensors", entry.sensors().len()), "a group of a single sensor"),
@@ -26,7 +26,7 @@ pub fn single_sensor(system: &System, group: usize) -> Result<&SensorGroup, Erro
 
 /// The gains of all levels of one sensor.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LevelGains {
+pub(crate) struct LevelGains {
     /// The gain of each level at each node, relative to the density of the sample there.
     pub gains: Vec<Vec<f64>>,
     /// Mean of the sample at each node.
@@ -40,7 +40,7 @@ impl LevelGains {
     ///
     /// # Errors
     /// If the group is not a single sensor, there are too many outcomes, or the criterion does not fit the prior.
-    pub fn new(system: &System, group: usize, criterion: Criterion) -> Result<Self, Error> {
+    pub(crate) fn new(system: &System, group: usize, criterion: Criterion) -> Result<Self, Error> {
         let entry = single_sensor(system, group)?;
         // Refuses a criterion that does not fit the prior, and too many outcomes.
         Problem::new(system, criterion, &[])?;

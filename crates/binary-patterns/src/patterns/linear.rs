@@ -63,13 +63,13 @@ pub(crate) struct Span {
 }
 
 impl Span {
-    pub fn rank(&self) -> usize {
+    pub(crate) fn rank(&self) -> usize {
         self.rank
     }
 
     /// The span with one more vector.
     #[must_use]
-    pub fn with(mut self, mut mask: Mask) -> Self {
+    pub(crate) fn with(mut self, mut mask: Mask) -> Self {
         while mask != 0 {
             let top = mask.ilog2() as usize;
             if self.leading[top] == 0 {

@@ -77,7 +77,7 @@ impl<const M: usize> GaussianInEllipsoid<M> {
     }
 
     /// `ln P(nu outside)`, accurate for tiny probabilities too.
-    pub fn log_probability_outside(&self, mu: &SVector<f64, M>) -> f64 {
+    pub(crate) fn log_probability_outside(&self, mu: &SVector<f64, M>) -> f64 {
         let b = self.forward * mu;
         if let Some(x) = b.iter().find(|x| !x.is_finite()) {
             return if x.is_nan() { f64::NAN } else { 0.0 };
@@ -90,7 +90,7 @@ impl<const M: usize> GaussianInEllipsoid<M> {
     }
 
     /// Mass, mean and covariance of `nu ~ N(mu, V)` outside; `None` if the mass is zero or `mu` is not finite.
-    pub fn moments_outside(&self, mu: &SVector<f64, M>) -> Option<EllipsoidMoments<M>> {
+    pub(crate) fn moments_outside(&self, mu: &SVector<f64, M>) -> Option<EllipsoidMoments<M>> {
         self.moments_on(Side::Outside, mu)
     }
 

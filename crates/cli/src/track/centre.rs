@@ -13,7 +13,7 @@ use fewbits_filters::centre::{
     Event, Failures, FalseAlarms, FusionCentre, NoiseLearning, ReportTest, Reporting, SensorState, Slot,
 };
 use fewbits_filters::smoother::{Filtered, smooth};
-use fewbits_filters::{MomentFilter, MovingGridFilter, StateFilter};
+use fewbits_filters::{MomentFilter, PointMassFilter, StateFilter};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_recipes::stated::{StatedReading, Stating};
 use nalgebra::Vector1;
@@ -90,7 +90,7 @@ pub(super) fn centre(world: &World, purpose: Use) -> Result<Box<dyn Estimator>, 
         Model::Returning | Model::Walk | Model::Ranges => {
             let model = world.walk(world.change)?;
             if world.is_cut {
-                Box::new(Centre::<1, _>::new(model, MovingGridFilter, world, purpose)?)
+                Box::new(Centre::<1, _>::new(model, PointMassFilter::following(), world, purpose)?)
             } else {
                 Box::new(Centre::<1, _>::new(model, MomentFilter, world, purpose)?)
             }

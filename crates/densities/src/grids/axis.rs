@@ -27,10 +27,7 @@ impl TryFrom<Stored> for UniformGrid {
     type Error = Error;
 
     fn try_from(Stored { lower, spacing, points }: Stored) -> Result<Self, Error> {
-        if !(2..=MAX_NODES).contains(&points) {
-            return refuse("points", points, format!("2 to {MAX_NODES} nodes"));
-        }
-        UniformGrid::of_nodes(finite("lower", lower)?, spacing, points)
+        UniformGrid::from_nodes(lower, spacing, points)
     }
 }
 
@@ -41,6 +38,18 @@ const MAX_NODES: usize = 1_000_000;
 pub(super) const MAX_WIDTH: f64 = 1e153;
 
 impl UniformGrid {
+    /// So many nodes from `lower` on, at this distance.
+    ///
+    /// # Errors
+    /// If `lower` is not finite, `spacing` not positive and finite, there are not 2 to a million nodes, or moments of a density on the nodes
+    /// could overflow.
+    pub fn from_nodes(lower: f64, spacing: f64, points: usize) -> Result<Self, Error> {
+        if !(2..=MAX_NODES).contains(&points) {
+            return refuse("points", points, format!("2 to {MAX_NODES} nodes"));
+        }
+        Self::of_nodes(finite("lower", lower)?, spacing, points)
+    }
+
     /// Returns an error if moments of a density on the nodes could overflow. A density is at most the reciprocal of the spacing.
     fn of_nodes(lower: f64, spacing: f64, points: usize) -> Result<Self, Error> {
         let grid = Self {

@@ -1,12 +1,12 @@
 //! The filter: settings, and all observations of one instant jointly.
 
-use super::{Grid, NODES, REACH, Workspace};
+use super::{Grid, NODES, REACH, Workspace, factor_of, regression};
 use crate::Error;
 use crate::contract::{Info, StateFilter};
 use fewbits_core::{Columns, Gaussian, GaussianDynamics, Likelihood, OnAxes};
 use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::linalg::congruence;
-use nalgebra::{Cholesky, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 
 /// For one, two and three axes: number of parts per axis into which the belief is divided, and over how many deviations to each side. Beyond
@@ -179,20 +179,13 @@ impl<const D: usize, const K: usize> StateFilter<D> for GridFilter<D, K> {
 fn divided<const D: usize, const K: usize>(belief: &Gaussian<D>, axes: &[usize; K]) -> Option<Vec<(f64, Gaussian<D>)>> {
     let (parts, reach) = *PARTS.get(K.checked_sub(1)?)?;
     let covariance = belief.covariance();
-    let observed = SMatrix::<f64, K, K>::from_fn(|i, j| covariance[(axes[i], axes[j])]);
-    let factor = Cholesky::new(observed)?;
+    let factor = factor_of(covariance, axes)?;
     let cross = SMatrix::<f64, K, D>::from_fn(|i, d| covariance[(axes[i], d)]);
     let along = factor.l().solve_lower_triangular(&cross)?.transpose();
     let step = 2.0 * reach / (parts - 1) as f64;
     let variance = (PART_DEVIATION * step).powi(2);
     // What `u` does not explain, as a sum of positive terms: (I - B L^-1 S) P (I - B L^-1 S)', where S takes the axes out of a state.
-    let gain = factor.solve(&cross).transpose();
-    let mut keep = SMatrix::<f64, D, D>::identity();
-    for (k, axis) in axes.iter().enumerate() {
-        for d in 0..D {
-            keep[(d, *axis)] -= gain[(d, k)];
-        }
-    }
+    let (_, keep) = regression(covariance, axes, &factor);
     let part = congruence(&keep, covariance) + along * along.transpose() * variance;
     let offset = |index: usize| (index as f64 - 0.5 * (parts - 1) as f64) * step;
     let all = (0..parts.pow(K as u32)).map(|index| {

@@ -16,7 +16,7 @@ use crate::Error;
 use fewbits_core::{Gaussian, Likelihood};
 use fewbits_numerics::error::{refuse, within};
 use fewbits_numerics::linalg::{congruence, symmetrised};
-use nalgebra::{Cholesky, SMatrix, SVector};
+use nalgebra::{Cholesky, Const, SMatrix, SVector};
 use region::{Piece, Region};
 
 /// Default number of nodes on each axis.
@@ -74,6 +74,32 @@ impl<const K: usize> Default for Workspace<K> {
     }
 }
 
+/// The root of the covariance of the coordinates `axes`; `None` if it is singular.
+fn factor_of<const D: usize, const K: usize>(
+    covariance: &SMatrix<f64, D, D>,
+    axes: &[usize; K],
+) -> Option<Cholesky<f64, Const<K>>> {
+    Cholesky::new(SMatrix::from_fn(|i, j| covariance[(axes[i], axes[j])]))
+}
+
+/// Regression of all coordinates on `axes`: the gain `P_{:K} P_K^-1`, and the matrix that takes what these explain out of a state. A
+/// congruence by it is a sum of positive terms.
+fn regression<const D: usize, const K: usize>(
+    covariance: &SMatrix<f64, D, D>,
+    axes: &[usize; K],
+    factor: &Cholesky<f64, Const<K>>,
+) -> (SMatrix<f64, D, K>, SMatrix<f64, D, D>) {
+    let cross = SMatrix::<f64, K, D>::from_fn(|i, j| covariance[(axes[i], j)]);
+    let gain = factor.solve(&cross).transpose();
+    let mut keep = SMatrix::<f64, D, D>::identity();
+    for (k, axis) in axes.iter().enumerate() {
+        for d in 0..D {
+            keep[(d, *axis)] -= gain[(d, k)];
+        }
+    }
+    (gain, keep)
+}
+
 impl Grid {
     fn new(nodes: usize, reach: f64) -> Result<Self, Error> {
         within("reach", reach, 2.0, 10.0)?;
@@ -101,8 +127,7 @@ impl Grid {
         workspace: &mut Workspace<K>,
     ) -> Result<(Gaussian<D>, f64), Error> {
         let origin = SVector::<f64, K>::from_fn(|i, _| predicted.mean()[axes[i]]);
-        let covariance = SMatrix::<f64, K, K>::from_fn(|i, j| predicted.covariance()[(axes[i], axes[j])]);
-        let Some(factor) = Cholesky::new(covariance) else {
+        let Some(factor) = factor_of(predicted.covariance(), &axes) else {
             return refuse("predicted", "a singular covariance of the observed coordinates", "a positive definite one");
         };
         let prior = Prior {
@@ -111,16 +136,7 @@ impl Grid {
         };
         let (posterior, log_likelihood) = self.posterior(&prior, observed, workspace)?;
 
-        // Regression of all coordinates on the observed ones: P_{:K} P_K^-1. The residual covariance is computed as a sum of positive
-        // terms.
-        let cross = SMatrix::<f64, K, D>::from_fn(|i, j| predicted.covariance()[(axes[i], j)]);
-        let gain = factor.solve(&cross).transpose();
-        let mut keep = SMatrix::<f64, D, D>::identity();
-        for (k, axis) in axes.iter().enumerate() {
-            for d in 0..D {
-                keep[(d, *axis)] -= gain[(d, k)];
-            }
-        }
+        let (gain, keep) = regression(predicted.covariance(), &axes, &factor);
         let moved = congruence(&(gain * prior.lower), &symmetrised(&posterior.covariance));
         let mean = predicted.mean() + gain * (prior.lower * posterior.mean);
         let updated = Gaussian::from_trusted_parts(mean, congruence(&keep, predicted.covariance()) + moved);

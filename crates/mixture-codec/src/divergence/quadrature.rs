@@ -59,7 +59,7 @@ impl<const D: usize> QuadratureGrid<D> {
     ///
     /// # Errors
     /// As [`QuadratureGrid::new`].
-    pub fn covering(p: &Mixture<D>, q: &Mixture<D>, reach: f64, fineness: f64) -> Result<Self, Error> {
+    fn covering(p: &Mixture<D>, q: &Mixture<D>, reach: f64, fineness: f64) -> Result<Self, Error> {
         let mut lower = [f64::INFINITY; D];
         let mut upper = [f64::NEG_INFINITY; D];
         let mut step = [f64::INFINITY; D];

@@ -133,18 +133,19 @@ impl<const S: usize> Problem<'_, S> {
     }
 }
 
-/// The lower triangular root; `None` if the matrix is not positive definite.
-fn root<const S: usize>(matrix: &Matrix<S>) -> Option<Matrix<S>> {
+/// The lower triangular root of the first `size` rows and columns of a matrix of these entries; `None` if a squared pivot is not above
+/// `least`. For few numbers, again and again: a plain loop over arrays.
+pub(super) fn root<const S: usize>(size: usize, least: f64, entry: impl Fn(usize, usize) -> f64) -> Option<Matrix<S>> {
     let mut root = [[0.0; S]; S];
-    for j in 0..S {
-        let left = matrix[j][j] - root[j][..j].iter().map(|x| x * x).sum::<f64>();
-        if left <= 0.0 || !left.is_finite() {
+    for j in 0..size {
+        let left = entry(j, j) - root[j][..j].iter().map(|x| x * x).sum::<f64>();
+        if left <= least || !left.is_finite() {
             return None;
         }
         root[j][j] = left.sqrt();
-        for i in j + 1..S {
+        for i in j + 1..size {
             let known: f64 = (0..j).map(|k| root[i][k] * root[j][k]).sum();
-            root[i][j] = (matrix[i][j] - known) / root[j][j];
+            root[i][j] = (entry(i, j) - known) / root[j][j];
         }
     }
     Some(root)
@@ -198,7 +199,7 @@ fn fit_of<const S: usize>(
     let mut x = middle;
     x[..axes].copy_from_slice(start.get(..axes)?);
     let mut local = problem.at(&x);
-    let mut factor = root(&local.information)?;
+    let mut factor = root(S, 0.0, |i, j| local.information[i][j])?;
     let mut step = solve(&factor, &local.gradient);
     let promise = |step: &Vector<S>, local: &Local<S>| -> f64 { (0..S).map(|i| step[i] * local.gradient[i]).sum() };
     for _ in 0..STEPS {
@@ -217,7 +218,7 @@ fn fit_of<const S: usize>(
             }
             share *= 0.5;
         }
-        factor = root(&local.information)?;
+        factor = root(S, 0.0, |i, j| local.information[i][j])?;
         step = solve(&factor, &local.gradient);
         if !has_moved {
             break;

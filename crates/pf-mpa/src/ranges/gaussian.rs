@@ -6,6 +6,8 @@
 //! moments   of the distance by cubature over the position, so that a wide belief near an anchor is not linearised at one point
 //! ```
 
+use super::fit::root;
+
 /// A normal law of the state. The covariance is stored in full, row by row.
 #[derive(Debug, PartialEq)]
 pub(super) struct Normal {
@@ -228,19 +230,8 @@ impl Normal {
 
     /// The lower triangular root of the positions' covariance; `None` if it is singular.
     fn root(&self, spread: f64) -> Option<[[f64; 3]; 3]> {
-        let (n, mut root) = (self.mean.len(), [[0.0; 3]; 3]);
-        for j in 0..self.axes {
-            let left = self.covariance[j * n + j] - root[j][..j].iter().map(|x| x * x).sum::<f64>();
-            if left <= 1e-14 * spread {
-                return None;
-            }
-            root[j][j] = left.sqrt();
-            for i in j + 1..self.axes {
-                let known: f64 = (0..j).map(|k| root[i][k] * root[j][k]).sum();
-                root[i][j] = (self.covariance[i * n + j] - known) / root[j][j];
-            }
-        }
-        Some(root)
+        let n = self.mean.len();
+        root(self.axes, 1e-14 * spread, |i, j| self.covariance[i * n + j])
     }
 
     /// Conditions on a range whose noise-free value has this mean and variance afterwards. `holds_scale`: mean and variance of the error of
