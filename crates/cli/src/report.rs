@@ -6,6 +6,7 @@ use fewbits_core::{FullValue, Gaussian, Link, NumberFormat, OnAxes, SchemeNode, 
 use fewbits_dymbo::{InnovationWord, Prediction, SignBit};
 use fewbits_filters::centre::{RemoteSensor, Reporting};
 use fewbits_models::LinearSensor;
+use fewbits_protocol::ReportLength;
 use nalgebra::SVector;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
@@ -79,6 +80,16 @@ impl Report {
             Self::Word { bits } => format!("word:{bits}"),
             Self::Value => "value".to_owned(),
             Self::Censored { threshold } => format!("silent:{threshold}"),
+        }
+    }
+
+    /// Length of a report. A report of another length is of a sensor whose file says another kind.
+    pub(crate) fn length(self) -> ReportLength {
+        match self {
+            Self::Sign => ReportLength::Fixed(1),
+            Self::Word { bits } => ReportLength::Fixed(bits),
+            Self::Value => ReportLength::Fixed(64),
+            Self::Censored { .. } => ReportLength::Varying,
         }
     }
 

@@ -236,8 +236,13 @@ impl Program for Samples {
         match self.node.report(&mut rng, &Vector1::new(sample), feedback) {
             Ok(report) => ControlFlow::Continue(report),
             Err(error) => {
-                self.notes
-                    .say("report", &format!("slot {}: no report: {error}", slot.number()));
+                self.notes.say(
+                    "report",
+                    &format!(
+                        "slot {}: no report: {error}; `report` must be the same here and at the centre",
+                        slot.number()
+                    ),
+                );
                 ControlFlow::Continue(None)
             }
         }

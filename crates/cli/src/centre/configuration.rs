@@ -211,6 +211,7 @@ impl Configuration {
                 coordinates.len()
             ));
         }
+        let has_fleet = table.contains_key("fleet_key_file") || table.contains_key("fleet_key");
         let fleet = fleet_key(&mut table, file, faults);
         let revoked = faults.take::<Vec<u32>>(&mut table, "revoked").unwrap_or_default();
         let entries = faults.need::<Vec<Value>>(&mut table, "sensor").unwrap_or_default();
@@ -230,6 +231,10 @@ impl Configuration {
             let Some(numbers) = faults.keep(&name, numbers(&entry)) else {
                 continue;
             };
+            // What is wrong with the fleet's key was said once.
+            if entry.key.is_none() && fleet.is_none() && has_fleet {
+                continue;
+            }
             for number in numbers.into_iter().filter(|number| !revoked.contains(number)) {
                 // What the key of one of a group lacks, all lack.
                 let Some(key) = faults.keep(&format!("sensor {number}"), key(&entry, number, fleet.as_ref())) else {

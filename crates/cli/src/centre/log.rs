@@ -115,6 +115,16 @@ impl Log {
                 note: Note::Heartbeat { .. },
                 ..
             } => {}
+            Output::Note {
+                sensor,
+                note: Note::Malformed { slot },
+            } => {
+                let (number, slot) = (self.number(*sensor), slot.number());
+                let text = format!(
+                    "sensor {number}: a report of another length, slot {slot}: `report` must be the same in its file and here"
+                );
+                self.notes.say_of("reports of another length", number, &text);
+            }
             Output::Note { sensor, note } => {
                 let (number, text) = (self.number(*sensor), note.to_string());
                 let kind = text.split(',').next().unwrap_or_default();

@@ -19,7 +19,7 @@ use fewbits_filters::centre::FusionCentre;
 use fewbits_link::{FusionReceiver, Output, Peer, Start, Station, Store, Transport, Udp, run_station};
 use fewbits_models::ContinuousLinear;
 use fewbits_monte_carlo::Stream;
-use fewbits_protocol::{CentreSettings, Feedback, Member, Receiver, ReportLength, Schedule};
+use fewbits_protocol::{CentreSettings, Feedback, Member, Receiver, Schedule};
 use log::Log;
 use nalgebra::{SMatrix, SVector};
 pub(crate) use rows::RowFormat;
@@ -154,11 +154,12 @@ fn with<const D: usize, T: Transport>(
     }
     let Some(open) = open else { return Ok(Ending::Good) };
     let period = NonZeroU64::new((given.period * 1e9).round() as u64).unwrap_or(NonZeroU64::MIN);
-    let member = Member {
+    let member = |sensor: &Sensor| Member {
         feedback: Feedback::Told,
-        report: ReportLength::Varying,
+        report: sensor.report.length(),
     };
-    let settings = CentreSettings::new(vec![member; peers.len()], Schedule::new(period));
+    let members = given.sensors.iter().map(member).collect();
+    let settings = CentreSettings::new(members, Schedule::new(period));
     let store = given.state.clone().map(|path| match given.durable {
         true => Store::new(path).durable(),
         false => Store::new(path),

@@ -490,3 +490,63 @@ fn second_centre_on_one_state_is_refused_and_nothing_else_is_silent() {
         .map(Result::unwrap);
     assert!(said.any(|line| line.contains("no answer from 127.0.0.1:")));
 }
+
+/// A key of the fleet that others may read is one fault, and so is one that is not there or no key.
+#[test]
+fn a_fault_of_the_fleets_key_is_no_second_one() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let init = ["centre", "centre.toml", "--init", "--sensors", "3"];
+    assert!(fewbits(folder.path(), &init, b"").status.success());
+    let path = folder.path().join("fleet.key");
+    let said = || text(&fewbits(folder.path(), &["check", "centre.toml"], b"").stderr);
+    std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o644)).unwrap();
+    let wide = said();
+    private(&path, "abcd");
+    let short = said();
+    std::fs::remove_file(&path).unwrap();
+    let none = said();
+    assert!(
+        wide.contains("chmod 600") && short.contains("fleet key") && none.contains("fleet.key"),
+        "{wide}{short}{none}"
+    );
+    for said in [wide, short, none] {
+        assert!(!said.contains("expected `key`") && !said.contains("faults"), "{said}");
+    }
+}
+
+/// The files of centre and sensor say different reports: either end names `report`.
+#[test]
+fn reports_of_another_kind_are_named() {
+    // Words of another length reach the centre; a question of another length stops the sensor.
+    for (there, names) in [
+        ("word:4", "another length"),
+        ("word:2", "another length"),
+        ("bit", "no report: "),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        written(folder.path(), &free_place(), &key('b'));
+        for (file, from, to) in [
+            ("centre.toml", "{ kind = \"value\" }", "\"word:3\""),
+            ("sensor1.toml", "{ kind = \"value\" }", &format!("\"{there}\"")),
+        ] {
+            let path = folder.path().join(file);
+            let before = std::fs::read_to_string(&path).unwrap();
+            assert!(before.contains(from));
+            private(&path, &before.replace(from, to));
+        }
+        let centre = Running::new(start(folder.path(), &["centre", "centre.toml", "--slots", MOST_SLOTS]));
+        let mut sensor = sensor(folder.path(), "sensor1.toml");
+        let said = Arc::default();
+        let reader = follow(sensor.stderr.take().unwrap(), &said);
+        let is_named = |line: &String| line.contains(names) && line.contains("`report` must be the same");
+        let (rows, at_centre, _) = stopped_after(centre, |_, at_centre| {
+            at_centre.iter().any(is_named) || said.lock().unwrap().iter().any(is_named)
+        });
+        sensor.kill().unwrap();
+        sensor.wait().unwrap();
+        reader.join().unwrap();
+        // What was not used does not count as a report.
+        assert!(self::rows(rows.iter().map(String::as_str)).iter().all(|row| row.1 == 0), "{there}: {at_centre:?}");
+    }
+}
