@@ -63,15 +63,14 @@ impl From<Receiver> for Stored {
 impl TryFrom<Stored> for Receiver {
     type Error = ArgumentError;
 
-    fn try_from(
-        Stored {
+    fn try_from(stored: Stored) -> Result<Self, ArgumentError> {
+        let Stored {
             config,
             replica,
             slot,
             sequence,
             synchronised,
-        }: Stored,
-    ) -> Result<Self, ArgumentError> {
+        } = stored;
         if replica.as_ref().is_some_and(|replica| !replica.is_valid(&config.0)) {
             return Err(ArgumentError::new("replica", "inconsistent", "the state that was stored"));
         }

@@ -67,15 +67,14 @@ impl From<Sensor> for Stored {
 impl TryFrom<Stored> for Sensor {
     type Error = ArgumentError;
 
-    fn try_from(
-        Stored {
+    fn try_from(stored: Stored) -> Result<Self, ArgumentError> {
+        let Stored {
             config,
             replica,
             slot,
             sequence,
             refresh_requested,
-        }: Stored,
-    ) -> Result<Self, ArgumentError> {
+        } = stored;
         let encoder = Encoder::restored(config.0, replica, slot, sequence, refresh_requested)?;
         Ok(Sensor { config, encoder })
     }

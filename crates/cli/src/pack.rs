@@ -5,9 +5,9 @@ use crate::error::Error;
 use crate::files::is_regular;
 use crate::input::{Survey, Table};
 use crate::live::{self, RowSink};
-use crate::once::{identity, is_file_to_be, once_readable};
 use crate::rows::TableRows;
 use crate::say::say;
+use crate::single_pass::{identity, is_written_beside, readable_once};
 use crate::target::{self, Target};
 use crate::{Ending, bounds, clock};
 use fewbits_recipes::bounds::exact;
@@ -293,8 +293,8 @@ fn appended(
 
 fn create(options: &PackOptions, effort: Effort) -> Result<(Done, Option<Error>), Error> {
     // If no range is needed and all rows are like the first ones, reading them once gives the same bytes as reading them twice.
-    if options.output.as_deref().is_some_and(is_file_to_be)
-        && let Some(table) = once_readable(&options.table, &options.bounds)?
+    if options.output.as_deref().is_some_and(is_written_beside)
+        && let Some(table) = readable_once(&options.table, &options.bounds)?
         && let Ok((table, schema)) = schema_of(table, &options.table, &options.bounds, Known::First)
         && let Ok(done) = created(options, effort, table, schema)
     {

@@ -239,7 +239,7 @@ impl Program for Samples {
                 self.notes.say(
                     "report",
                     &format!(
-                        "slot {}: no report: {error}; `report` must be the same here and at the centre",
+                        "slot {}: no report: {error} (is `report` the same here and at the centre?)",
                         slot.number()
                     ),
                 );

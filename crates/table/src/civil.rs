@@ -7,6 +7,10 @@ use crate::zones::zone_of;
 pub(crate) use crate::zones::{Zone, offset};
 use jiff::civil::Date;
 
+pub(crate) const AMBIGUOUS: Problem =
+    ("may have the day or the month first", "say --time-format dmy or --time-format mdy");
+pub(crate) const YEAR: Problem = ("may have the year first or last", "say --time-format ymd, dmy or mdy");
+
 /// Order of day, month and year.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Order {

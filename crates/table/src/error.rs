@@ -141,7 +141,7 @@ impl Error {
     ///
     /// [`Profile::day_order`]: crate::Profile::day_order
     pub fn is_day_or_month(&self) -> bool {
-        matches!(self, Self::Cell { problem, .. } if *problem == crate::written::AMBIGUOUS.0)
+        matches!(self, Self::Cell { problem, .. } if *problem == crate::civil::AMBIGUOUS.0)
     }
 
     /// Where the fault is, if it is that of one row: what [`Dialect::skip_bad`](crate::Dialect::skip_bad) may leave out.

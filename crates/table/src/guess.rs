@@ -1,8 +1,9 @@
 //! How the times of a column are written, by its cells.
 
+use crate::civil::YEAR;
 use crate::civil::{self, Zone, digits, is_compact};
 use crate::time::{Scale, Unit};
-use crate::written::{AMBIGUOUS, Clock, NAMED_ZONE, Order, Problem, Syntax, YEAR};
+use crate::written::{AMBIGUOUS, Clock, NAMED_ZONE, Order, Problem, Syntax};
 
 /// How cells of a column are written, if all are times; an ambiguity if the day or the month may stand first.
 pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Problem>> {

@@ -2,7 +2,7 @@
 
 use crate::calendar;
 use crate::civil::{self, Zone, offset};
-pub(crate) use crate::civil::{NO_SUCH_DATE, Order, Problem};
+pub(crate) use crate::civil::{AMBIGUOUS, NO_SUCH_DATE, Order, Problem};
 use crate::interval;
 use crate::parts::{Part, joined, padded};
 use crate::quick;
@@ -51,9 +51,6 @@ const DOUBTFUL: Problem = (
     "is no time of that zone, or two (a change of daylight saving)",
     "say a fixed offset, as --time-zone +01:00, or leave --time-zone out to keep local times",
 );
-pub(crate) const AMBIGUOUS: Problem =
-    ("may have the day or the month first", "say --time-format dmy or --time-format mdy");
-pub(crate) const YEAR: Problem = ("may have the year first or last", "say --time-format ymd, dmy or mdy");
 
 /// A plain number of units as attoseconds.
 fn number(text: &str, unit: Unit) -> Result<Time, Problem> {

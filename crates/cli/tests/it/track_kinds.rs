@@ -5,6 +5,11 @@ use crate::track_found::{has_hint, held, of, tracked};
 use crate::{good, refused, text};
 use serde_json::Value;
 
+/// Number of rows whose band holds the level.
+fn held_of(rows: &[Value], truth: &[f64]) -> usize {
+    rows.iter().zip(truth).filter(|(row, level)| held(row, **level)).count()
+}
+
 /// Defect: the noise of an accurate sensor beside a level that moves by far more was found at the lower end of the search, a hundred times too
 /// small, and the bands with it.
 #[test]
@@ -18,11 +23,7 @@ fn a_noise_that_the_rows_hardly_tell_is_not_tiny() {
         table += &format!("{row},{}\n", cells.join(","));
     }
     let (rows, _) = tracked(&table, &[]);
-    let held = rows
-        .iter()
-        .zip(&truth)
-        .filter(|(row, level)| held(row, **level))
-        .count();
+    let held = held_of(&rows, &truth);
     assert!(held as f64 > 0.9 * truth.len() as f64, "{held} of {}", truth.len());
 }
 
@@ -52,11 +53,7 @@ fn a_value_at_a_limit_is_at_it() {
             .fold(0.0, f64::max)
     };
     assert!(apart(&stated, &found) == 0.0 && apart(&stated, &by_marks) < 0.02, "{}", apart(&stated, &by_marks));
-    let held = found
-        .iter()
-        .zip(&truth)
-        .filter(|(row, level)| held(row, **level))
-        .count();
+    let held = held_of(&found, &truth);
     assert!(held as f64 > 0.9 * truth.len() as f64, "{held} of {}", truth.len());
 }
 
@@ -135,11 +132,7 @@ fn right_silences_are_not_rejected() {
         }
         let (rows, _) = tracked(&table, options);
         let rejected: f64 = rows.iter().map(|row| of(row, "rejected")).sum();
-        let kept = rows
-            .iter()
-            .zip(&truth)
-            .filter(|(row, level)| held(row, **level))
-            .count();
+        let kept = held_of(&rows, &truth);
         // Errors last from one value to the next: some forty are independent, and two standard errors of a share of .95 are .07.
         assert!(rejected <= 4.0 && kept > 880, "{options:?}: {rejected} rejected, {kept} held");
     }

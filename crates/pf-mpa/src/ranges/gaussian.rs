@@ -6,7 +6,7 @@
 //! moments   of the distance by cubature over the position, so that a wide belief near an anchor is not linearised at one point
 //! ```
 
-use super::fit::root;
+use super::root::root;
 
 /// A normal law of the state. The covariance is stored in full, row by row.
 #[derive(Debug, PartialEq)]

@@ -24,6 +24,7 @@ mod gaussian;
 mod heights;
 mod moved;
 mod odds;
+mod root;
 mod rows;
 mod search;
 mod settings;

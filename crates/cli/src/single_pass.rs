@@ -1,4 +1,4 @@
-//! Files that are packed by reading them once, and the identity of what is packed.
+//! Tables that are packed in a single pass, and the identity of what is packed.
 
 use crate::arguments::{BoundOptions, TableOptions};
 use crate::error::Error;
@@ -10,12 +10,12 @@ use std::io::Read;
 use std::path::Path;
 
 /// Whether an output is written beside its place, so that it can be given up.
-pub(crate) fn is_file_to_be(path: &Path) -> bool {
+pub(crate) fn is_written_beside(path: &Path) -> bool {
     std::fs::metadata(path).map_or(true, |found| found.is_file())
 }
 
 /// The table, if it is a file of plain numbers in its first rows, and no bound needs the ranges of columns.
-pub(crate) fn once_readable(options: &TableOptions, bounds: &BoundOptions) -> Result<Option<Table>, Error> {
+pub(crate) fn readable_once(options: &TableOptions, bounds: &BoundOptions) -> Result<Option<Table>, Error> {
     let is_candidate = is_regular(&options.file)
         && options.by.is_none()
         && options.dialect.said()?.skip_bad == 0
