@@ -539,7 +539,7 @@ fn reports_of_another_kind_are_named() {
         let mut sensor = sensor(folder.path(), "sensor1.toml");
         let said = Arc::default();
         let reader = follow(sensor.stderr.take().unwrap(), &said);
-        let is_named = |line: &String| line.contains(names) && line.contains("`report` must be the same");
+        let is_named = |line: &String| line.contains(names) && line.contains("`report`");
         let (rows, at_centre, _) = stopped_after(centre, |_, at_centre| {
             at_centre.iter().any(is_named) || said.lock().unwrap().iter().any(is_named)
         });
