@@ -36,7 +36,13 @@ else
   echo "skipped: the gallery: cargo xtask figures"
 fi
 
-[ "$quick" = quick ] || cargo doc --workspace --no-deps --quiet
+if [ "$quick" != quick ]; then
+  # A link to a crate is made only if the folder of that crate is there. Crates are documented in any order, and the folder of one is missing
+  # while that crate begins: hence empty folders, and one crate at a time.
+  rm -rf "$target/doc"
+  for name in $(sed -n '/^\[package\]/,/^\[/s/^name = "\(.*\)"/\1/p' crates/*/Cargo.toml | tr - _); do mkdir -p "$target/doc/$name"; done
+  cargo doc --workspace --no-deps --jobs 1 --quiet
+fi
 if [ -f "$target/doc/fewbits/index.html" ]; then
   cp -r "$target/doc" "$book/api"
   rm -f "$book"/api/*.json

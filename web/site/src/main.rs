@@ -158,7 +158,7 @@ impl Site {
             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
              <meta name=\"color-scheme\" content=\"light dark\">\n<link rel=\"icon\" href=\"data:,\">\n<link rel=\"stylesheet\" href=\"site.css\">\n\
              <title>{title} - fewbits</title>\n</head>\n<body>\n<nav aria-label=\"Pages\">\n<p><label>Search <input id=\"search\" type=\"search\" autocomplete=\"off\"></label></p>\n\
-             <div id=\"found\" role=\"status\"></div>\n<ul>{extra}</ul>\n<ul>{pages}</ul>\n</nav>\n<main>\n{body}</main>\n<script src=\"search.js\"></script>\n</body>\n</html>\n",
+             <div id=\"found\" role=\"status\"></div>\n<ul>{extra}</ul>\n<details id=\"pages\" open><summary>Pages</summary><ul>{pages}</ul></details>\n</nav>\n<main>\n{body}</main>\n<script src=\"search.js\"></script>\n</body>\n</html>\n",
             title = markdown::escaped(&page.title),
             body = page.html(&link),
         ))
