@@ -129,6 +129,8 @@ impl Page {
         }
         wrapped
             .replace("</table>", "</table></div>")
+            // A header is for what it names.
+            .replace("<th></th>", "<td></td>")
             .replace("<pre>", "<pre tabindex=\"0\">")
     }
 }
