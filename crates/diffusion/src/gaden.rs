@@ -42,6 +42,48 @@ fn header<const N: usize>(line: Option<&str>, name: &'static str) -> Result<[f64
     }
 }
 
+/// The entries of all cells in the order of a [`Grid`]: for each layer of z one line per x with one word per y, then a line `;`.
+fn layers<'a, T: Clone>(
+    lines: impl Iterator<Item = &'a str>,
+    counts: [usize; 3],
+    name: &'static str,
+    expected: &str,
+    read: impl Fn(&str) -> Option<T>,
+) -> Result<Vec<T>, Error> {
+    let mut words = Vec::new();
+    let (mut column, mut layer) = (0, 0);
+    for line in lines {
+        if line == ";" {
+            (column, layer) = (0, layer + 1);
+            continue;
+        }
+        let line: Vec<&str> = line.split_whitespace().collect();
+        if column >= counts[0] || layer >= counts[2] || line.len() != counts[1] {
+            let found = format!("{} numbers in line {column} of layer {layer}", line.len());
+            let expected = format!("{} numbers in each of {} lines of {} layers", counts[1], counts[0], counts[2]);
+            return refuse(name, found, expected);
+        }
+        for (row, word) in line.into_iter().enumerate() {
+            match read(word) {
+                Some(entry) => words.push((column + counts[0] * (row + counts[1] * layer), entry)),
+                None => return refuse(name, format!("`{word}` in line {column} of layer {layer}"), expected),
+            }
+        }
+        column += 1;
+    }
+    // Each line has its own place, so as many entries as cells are one for each.
+    let whole = counts.iter().try_fold(1_usize, |n, count| n.checked_mul(*count));
+    if whole != Some(words.len()) {
+        return refuse(
+            name,
+            words.len(),
+            format!("{} x {} x {}, the numbers of cells", counts[0], counts[1], counts[2]),
+        );
+    }
+    words.sort_unstable_by_key(|(cell, _)| *cell);
+    Ok(words.into_iter().map(|(_, entry)| entry).collect())
+}
+
 /// Largest number of cells along an axis.
 const LONGEST: f64 = 100_000.0;
 
@@ -72,45 +114,18 @@ impl Room {
                 return refuse("env_max", format!("{} m along axis {axis}", top[axis] - corner[axis]), expected);
             }
         }
-        // A room of more cells than the text has characters cannot be complete.
-        let expected = counts.iter().try_fold(1_usize, |n, count| n.checked_mul(*count));
-        let Some(expected) = expected.filter(|n| *n <= text.len()) else {
-            return refuse("num_cells", format!("{counts:?}"), "no more cells than the text has");
-        };
-        let mut cells = vec![None; expected];
-        let (mut column, mut layer) = (0, 0);
-        for line in lines {
-            if line == ";" {
-                (column, layer) = (0, layer + 1);
-                continue;
-            }
-            let words: Vec<&str> = line.split_whitespace().collect();
-            if column >= counts[0] || layer >= counts[2] || words.len() != counts[1] {
-                let found = format!("{} numbers in line {column} of layer {layer}", words.len());
-                let expected = format!("{} numbers in each of {} lines of {} layers", counts[1], counts[0], counts[2]);
-                return refuse("cells", found, expected);
-            }
-            for (row, word) in words.into_iter().enumerate() {
-                cells[column + counts[0] * (row + counts[1] * layer)] = Some(match word {
-                    "0" => Cell::Free,
-                    "1" => Cell::Blocked(Boundary::Closed),
-                    "2" => Cell::Open(Boundary::Outflow),
-                    other => return refuse("cells", format!("`{other}`"), "0 (free), 1 (solid) or 2 (outlet)"),
-                });
-            }
-            column += 1;
-        }
-        let found = cells.iter().flatten().count();
-        let cells: Option<Vec<Cell>> = cells.into_iter().collect();
-        match cells {
-            Some(cells) => Ok(Self {
-                corner,
-                counts,
-                width,
-                cells,
-            }),
-            None => refuse("cells", found, format!("{expected}, as the head says")),
-        }
+        let cells = layers(lines, counts, "cells", "0 (free), 1 (solid) or 2 (outlet)", |word| match word {
+            "0" => Some(Cell::Free),
+            "1" => Some(Cell::Blocked(Boundary::Closed)),
+            "2" => Some(Cell::Open(Boundary::Outflow)),
+            _ => None,
+        })?;
+        Ok(Self {
+            corner,
+            counts,
+            width,
+            cells,
+        })
     }
 
     /// Numbers of cells along x, y and z.
@@ -181,6 +196,24 @@ impl Room {
     pub fn wind(&self, domain: &Domain, table: &Table) -> Result<Flow, Error> {
         let means = self.means(domain, table, ["U:0", "U:1", "U:2"])?;
         let velocities: Vec<[f64; 3]> = means.into_iter().map(|mean| mean.unwrap_or_default()).collect();
+        Flow::from_cells(domain, &velocities, Divergence::Project)
+    }
+
+    /// The wind of three texts, one per component (`wind_..._U`, `_V` and `_W`), each with one number per cell in the lines and layers of
+    /// the room, m/s: the values in the free cells, freed of divergence.
+    ///
+    /// # Errors
+    /// If a text has other lines than the room or an entry that is no finite number, or as [`Flow::from_cells`].
+    pub fn wind_by_components(&self, domain: &Domain, components: [&str; 3]) -> Result<Flow, Error> {
+        let mut velocities = vec![[0.0; 3]; domain.free().len()];
+        for (axis, (text, name)) in components.into_iter().zip(["U", "V", "W"]).enumerate() {
+            let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+            let number = |word: &str| word.parse::<f64>().ok().filter(|x| x.is_finite());
+            let values = layers(lines, self.counts, name, "a finite number", number)?;
+            for (velocity, cell) in velocities.iter_mut().zip(domain.free()) {
+                velocity[axis] = values[*cell];
+            }
+        }
         Flow::from_cells(domain, &velocities, Divergence::Project)
     }
 

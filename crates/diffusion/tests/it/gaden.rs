@@ -79,6 +79,40 @@ fn a_wind_without_divergence_is_kept() {
     }
 }
 
+/// The same velocities as a table and as three texts of layers, one per component, are one flow.
+#[test]
+fn a_wind_by_components_is_that_of_the_table() {
+    let (room, domain) = (Room::parse(&room_text()).unwrap(), by_hand());
+    let velocity = |[x, y, z]: [usize; 3]| [0.3 + 0.01 * x as f64, 0.02 * y as f64 - 0.01, 0.005 * z as f64];
+    let rows =
+        table_text(&domain, "U:0,U:1,U:2", |number, _| velocity(domain.grid().place(domain.free()[number])).to_vec());
+    let component = |axis: usize| {
+        let mut text = String::new();
+        for z in 0..2 {
+            for x in 0..6 {
+                let line: Vec<String> = (0..4).map(|y| velocity([x, y, z])[axis].to_string()).collect();
+                text += &(line.join(" ") + " \n");
+            }
+            text += ";\n";
+        }
+        text
+    };
+    let [u, v, w] = [0, 1, 2].map(component);
+    let by_components = room.wind_by_components(&domain, [&u, &v, &w]).unwrap();
+    assert_eq!(by_components, room.wind(&domain, &Table::parse(&rows).unwrap()).unwrap());
+    for (bad, name) in [
+        (v.replacen("0.01", "nan", 1), "V"),
+        (v.replacen(';', "", 1), "V"),
+        (String::new(), "V"),
+    ] {
+        let error = room
+            .wind_by_components(&domain, [&u, &bad, &w])
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains(name), "{error}");
+    }
+}
+
 /// Concentrations of our own solver, written as tables of two times and read: cell by cell their mean.
 #[test]
 fn averages_are_the_means_of_what_was_written() {
@@ -155,27 +189,29 @@ proptest! {
     }
 }
 
-/// A room and a wind as the simulator itself wrote them.
+/// A room and a wind as the simulator itself wrote them; the wind as one table, or as three files that end in `_U`, `_V` and `_W`.
 #[test]
 #[ignore = "set FEWBITS_GADEN_ROOM and FEWBITS_GADEN_WIND to files of the simulator"]
 fn files_of_the_simulator_are_read() {
-    let read = |name: &str| std::fs::read_to_string(std::env::var(name).unwrap()).unwrap();
-    let text = read("FEWBITS_GADEN_ROOM");
+    let [room, wind] = ["FEWBITS_GADEN_ROOM", "FEWBITS_GADEN_WIND"].map(|name| std::env::var(name).unwrap());
+    let read = |path: &str| std::fs::read_to_string(path).unwrap();
+    let text = read(&room);
     let room = Room::parse(&text).unwrap();
     let domain = room.domain().unwrap();
-    let count = |wanted: &str| {
-        text.lines()
-            .skip(4)
-            .flat_map(str::split_whitespace)
-            .filter(|word| *word == wanted)
-            .count()
-    };
+    let words = || text.lines().skip(4).flat_map(str::split_whitespace);
+    let count = |wanted: &str| words().filter(|word| *word == wanted).count();
     // Of the outlets those on the sides.
     let air = domain.free().len();
     assert!((count("0")..=count("0") + count("2")).contains(&air), "{air}");
-    let wind = Table::parse(&read("FEWBITS_GADEN_WIND")).unwrap();
-    let velocities = room.wind(&domain, &wind).unwrap().velocities(&domain);
+    let flow = match wind.strip_suffix("_U") {
+        Some(stem) => {
+            let [u, v, w] = ["_U", "_V", "_W"].map(|end| read(&format!("{stem}{end}")));
+            room.wind_by_components(&domain, [&u, &v, &w]).unwrap()
+        }
+        None => room.wind(&domain, &Table::parse(&read(&wind)).unwrap()).unwrap(),
+    };
+    let velocities = flow.velocities(&domain);
     let fastest = velocities.iter().flatten().fold(0.0, |most: f64, v| most.max(v.abs()));
-    println!("{:?} cells, {air} of air, {} rows of wind, up to {fastest} m/s", room.counts(), wind.len());
+    println!("{:?} cells, {air} of air, up to {fastest} m/s", room.counts());
     assert!(velocities.len() == air && fastest.is_finite());
 }
