@@ -595,3 +595,19 @@ fn reports_of_another_kind_are_named_at_both_ends() {
     let of_the_same = |line: &String| line.contains("sensor 11:") || line.contains("sensor 12:");
     assert!(!at_centre.iter().any(of_the_same), "{at_centre:?}");
 }
+
+/// Defect: the time of a row for InfluxDB was computed in doubles, up to 128 ns beside the end of its slot, so that rows of several centres
+/// with equal slots had other times.
+#[test]
+fn times_for_influx_are_ends_of_slots_to_the_nanosecond() {
+    let folder = tempfile::tempdir().unwrap();
+    written(folder.path(), &free_place(), &key('b'));
+    let options = ["centre", "centre.toml", "--rows", "influx", "--slots", "5"];
+    let output = Running::new(start(folder.path(), &options)).output();
+    let rows = text(&output.stdout);
+    assert_eq!(rows.lines().count(), 5, "{rows}");
+    for row in rows.lines() {
+        let time: u64 = row.rsplit(' ').next().unwrap().parse().unwrap();
+        assert_eq!(time % 40_000_000, 0, "{row}");
+    }
+}
