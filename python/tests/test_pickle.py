@@ -141,7 +141,7 @@ def test_designs(criterion):
         # A prior by a density is normalised anew, to rounding.
         assert np.array_equal(words, other.encode(rows)) and np.allclose(design.decode(words), other.decode(words), rtol=1e-13, atol=0)
         assert (design.value, design.bound, design.cut_short) == (other.value, other.bound, other.cut_short)
-        assert pl.DataFrame(design.cells).equals(pl.DataFrame(other.cells)) and len(design.c_header("x")) == len(other.c_header("x"))
+        assert pl.DataFrame(design.cells).equals(pl.DataFrame(other.cells)) and other.c_header("x").startswith(design.c_header("x")[:40])
 
 
 def skew(x):
