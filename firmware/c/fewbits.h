@@ -74,6 +74,28 @@ void fewbits_encoder_request_refresh(fewbits_encoder *encoder);
 /* What a receiver that lost nothing holds for the last sample; NaN before the first. */
 double fewbits_encoder_reconstruction(const fewbits_encoder *encoder);
 
+/* Frames of docs/wire.md, with the check over the whole frame. What a sensor writes are reports, requests and heartbeats, what it reads
+ * feedback, acknowledgements and heartbeats. Bits of the payload are packed from the most significant of the first byte; those behind the
+ * last are 0. Without bits `payload` may be null. A frame has 10 bytes besides its payload. */
+enum { FEWBITS_FEEDBACK = 0, FEWBITS_REPORT = 1, FEWBITS_REQUEST = 4, FEWBITS_HEARTBEAT = 6, FEWBITS_ACKNOWLEDGEMENT = 7 };
+typedef struct {
+    uint32_t kind;
+    uint32_t slot;   /* modulo 2^24 */
+    uint32_t digest; /* of a report: that of the feedback it answers; of a sensor that reports by the clock, of no bits in its slot */
+    const uint8_t *payload;
+    size_t bits;
+} fewbits_frame;
+
+/* The digest of bits in a slot. Returns 0 or FEWBITS_REFUSED. */
+int32_t fewbits_frame_digest(uint32_t slot, const uint8_t *payload, size_t bits, uint32_t *digest);
+
+/* Returns the number of bytes written, or FEWBITS_REFUSED if the frame is not one of these kinds or does not fit in `room` bytes. */
+int32_t fewbits_frame_write(const fewbits_frame *frame, uint8_t *bytes, size_t room);
+
+/* Reads a frame that takes all `count` bytes; its payload points into them. Returns 0, or FEWBITS_REFUSED if they are no frame of this
+ * version, or damaged: `frame` is unchanged then. */
+int32_t fewbits_frame_read(const uint8_t *bytes, size_t count, fewbits_frame *frame);
+
 #ifdef __cplusplus
 }
 #endif

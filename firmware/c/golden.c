@@ -97,6 +97,80 @@ static int check(const char *folder, const char *name)
     return 0;
 }
 
+/* CRC-16 and digest as docs/wire.md defines them, bit by bit. */
+static uint32_t crc(const uint8_t *bytes, size_t count)
+{
+    uint32_t sum = 0;
+    for (size_t i = 0; i < 8 * count; ++i) {
+        uint32_t bit = (bytes[i / 8] >> (7 - i % 8) & 1) ^ (sum >> 15);
+        sum = (sum << 1 & 0xffff) ^ (bit ? 0x1021 : 0);
+    }
+    return sum;
+}
+
+static uint64_t fnv(uint64_t hash, uint64_t number, int bytes)
+{
+    for (int i = 0; i < bytes; ++i)
+        hash = (hash ^ (number >> 8 * i & 0xff)) * 0x100000001b3u;
+    return hash;
+}
+
+/* Frames of random contents against the definition, then read again, then with a bit changed. */
+static int frames(void)
+{
+    static const uint8_t example[] = {0x4c, 1, 2, 3, 0xde, 0xad, 0xbe, 0xef, 0xb0, 0x6a, 0x0a};
+    static const uint32_t kinds[] = {FEWBITS_FEEDBACK, FEWBITS_REPORT, FEWBITS_REQUEST, FEWBITS_HEARTBEAT, FEWBITS_ACKNOWLEDGEMENT};
+    const uint8_t four = 0xb0;
+    uint8_t bytes[64], payload[32], expected[64];
+    fewbits_frame frame = {FEWBITS_REPORT, 66051, 0xdeadbeef, &four, 4}, again;
+    if (fewbits_frame_write(&frame, bytes, sizeof bytes) != sizeof example || memcmp(bytes, example, sizeof example) != 0)
+        return puts("frames: not the example of docs/wire.md"), 1;
+    uint64_t state = 1;
+    for (int record = 0; record < 10000; ++record) {
+        state = state * 6364136223846793005u + 1442695040888963407u;
+        uint32_t word = (uint32_t)(state >> 32), sum;
+        size_t bits = word % 250, count = (bits + 7) / 8, end = 8 + count;
+        for (size_t i = 0; i < count; ++i)
+            payload[i] = (uint8_t)(word >> (i % 24) ^ i);
+        if (bits % 8)
+            payload[count - 1] &= (uint8_t)(0xff << (8 - bits % 8));
+        uint32_t slot = word & 0xffffff;
+        uint64_t hash = fnv(fnv(0xcbf29ce484222325u, slot, 8), bits, 8);
+        for (size_t i = 0; i < count; ++i)
+            hash = fnv(hash, payload[i], 1);
+        if (fewbits_frame_digest(slot, payload, bits, &sum) != 0 || sum != (uint32_t)(hash ^ hash >> 32))
+            return printf("frames: digest %d differs\n", record), 1;
+        frame = (fewbits_frame){kinds[word % 5], word, sum, payload, bits};
+        expected[0] = (uint8_t)(0x40 | frame.kind << 3 | (8 * count - bits));
+        for (int i = 0; i < 3; ++i)
+            expected[1 + i] = (uint8_t)(slot >> (16 - 8 * i));
+        for (int i = 0; i < 4; ++i)
+            expected[4 + i] = (uint8_t)(sum >> (24 - 8 * i));
+        memcpy(expected + 8, payload, count);
+        expected[end] = (uint8_t)(crc(expected, end) >> 8);
+        expected[end + 1] = (uint8_t)crc(expected, end);
+        int length = fewbits_frame_write(&frame, bytes, sizeof bytes);
+        if (length != (int)end + 2 || memcmp(bytes, expected, end + 2) != 0)
+            return printf("frames: frame %d differs\n", record), 1;
+        if (fewbits_frame_write(&frame, bytes, end + 1) != FEWBITS_REFUSED || fewbits_frame_read(bytes, end + 2, &again) != 0
+            || again.kind != frame.kind || again.slot != slot || again.digest != sum || again.bits != bits
+            || (bits && memcmp(again.payload, payload, count) != 0))
+            return printf("frames: frame %d is not read\n", record), 1;
+        bytes[word % (end + 2)] ^= (uint8_t)(1 << word % 8);
+        if (fewbits_frame_read(bytes, end + 2, &again) != FEWBITS_REFUSED)
+            return printf("frames: damaged frame %d is read\n", record), 1;
+    }
+    frame = (fewbits_frame){2, 1, 1, NULL, 0};
+    int taken = fewbits_frame_write(&frame, bytes, sizeof bytes) != FEWBITS_REFUSED;
+    frame = (fewbits_frame){FEWBITS_REPORT, 1, 1, NULL, 3};
+    taken |= fewbits_frame_write(&frame, bytes, sizeof bytes) != FEWBITS_REFUSED || fewbits_frame_write(NULL, bytes, 9) != FEWBITS_REFUSED;
+    taken |= fewbits_frame_read(bytes, 9, &frame) != FEWBITS_REFUSED || fewbits_frame_read(NULL, 20, &frame) != FEWBITS_REFUSED;
+    if (taken)
+        return puts("frames: what must be refused is not"), 1;
+    puts("frames: 10000 are as docs/wire.md defines them");
+    return 0;
+}
+
 int main(int argc, char **argv)
 {
     static const char *names[] = {"sign-bit", "sign-bit-codes", "innovation-word", "innovation-word-codes", "quantizer-word",
@@ -105,6 +179,7 @@ int main(int argc, char **argv)
     int failed = 0;
     for (size_t i = 0; i < sizeof names / sizeof *names; ++i)
         failed |= check(argc > 1 ? argv[1] : ".", names[i]);
+    failed |= frames();
     /* What is refused, and what a null pointer does. */
     double zero = 0, nan = zero / zero;
     failed |= fewbits_sign_bit_f64(nan, 0) != FEWBITS_REFUSED || fewbits_cell_f64(NULL, 3, 1) != FEWBITS_REFUSED;

@@ -34,6 +34,20 @@ impl Likelihoods {
         Ok(Self::ByName(functions))
     }
 
+    /// As it was given.
+    pub(crate) fn given<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        match self {
+            Self::One(function) => Ok(function.bind(py).clone()),
+            Self::ByName(functions) => {
+                let all = PyDict::new(py);
+                for (name, function) in functions {
+                    all.set_item(name, function)?;
+                }
+                Ok(all.into_any())
+            }
+        }
+    }
+
     /// The names of the columns; one without a name if there is one function.
     pub(crate) fn names(&self) -> Vec<Option<&str>> {
         match self {

@@ -3,9 +3,11 @@
 use crate::array::{matrix, shown};
 use crate::callbacks::{Likelihoods, returned, rising};
 use crate::error::{Failure, Outcome, refused};
+use crate::given::named;
 use crate::model::with_dimension;
-use crate::random::Generator;
+use crate::random::{self, Generator};
 use crate::sigma::{Sensor, of_columns, said, sensors};
+use crate::stored::{self, Reduced};
 use crate::table::{Given, Table, doubles};
 use arrow_array::Int64Array;
 use fewbits_core::Gaussian;
@@ -13,7 +15,11 @@ use fewbits_core::points::move_measured_points;
 use fewbits_filters::Error;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use std::sync::Arc;
+
+/// The functions, and the state.
+type Parts<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyBytes>);
 
 /// The ensemble Kalman filter: equally weighted members that move by the dynamics, noise included, and by regression on what was measured.
 ///
@@ -56,9 +62,9 @@ impl EnsembleFilter {
         r#move: &Bound<'_, PyAny>,
         measure: &Bound<'_, PyAny>,
         noise: &Bound<'_, PyAny>,
-        seed: u64,
+        #[pyo3(from_py_with = named)] seed: u64,
         send: Option<&Bound<'_, PyAny>>,
-        inflation: f64,
+        #[pyo3(from_py_with = named)] inflation: f64,
     ) -> Outcome<Self> {
         let (d, n, numbers) = matrix("start", start)?;
         if numbers.is_empty() || d > 6 {
@@ -84,10 +90,50 @@ impl EnsembleFilter {
         })
     }
 
+    #[staticmethod]
+    fn _restored(
+        py: Python<'_>,
+        r#move: Py<PyAny>,
+        measure: &Bound<'_, PyAny>,
+        state: &Bound<'_, PyAny>,
+    ) -> Outcome<Self> {
+        let (members, sensors, inflation, generator): (Vec<Vec<f64>>, Vec<Sensor>, f64, random::State) =
+            stored::state(state)?;
+        let measures = Likelihoods::parsed("measure", measure)?;
+        let count = members.first().map_or(0, Vec::len);
+        let alike = members
+            .iter()
+            .all(|column| column.len() == count && column.iter().all(|x| x.is_finite()));
+        let right = (1..=6).contains(&members.len()) && count > 0 && sensors.len() == measures.names().len();
+        if !(alike && right && inflation >= 1.0 && sensors.iter().all(Sensor::is_valid)) {
+            return refused("state", format!("{} coordinates", members.len()), "that of an ensemble filter");
+        }
+        Ok(Self {
+            members,
+            transition: r#move,
+            measures,
+            sensors,
+            inflation,
+            generator: Py::new(py, Generator::restored(generator)?)?,
+        })
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Outcome<Reduced<'py, Parts<'py>>> {
+        let generator = self.generator.borrow(py).state();
+        let state = stored::bytes(py, &(&self.members, &self.sensors, self.inflation, generator))?;
+        let parts = (self.transition.bind(py).clone(), self.measures.given(py)?, state);
+        Ok((stored::maker::<Self>(py)?, parts))
+    }
+
     /// Moves the members by `dt` seconds (not if 0) and by the observation (not if None or NaN). Returns the log likelihood. With
     /// measurements by name the observation is a dictionary.
     #[pyo3(signature = (observation=None, *, dt=1.0))]
-    fn step(&mut self, py: Python<'_>, observation: Option<Bound<'_, PyAny>>, dt: f64) -> Outcome<f64> {
+    fn step(
+        &mut self,
+        py: Python<'_>,
+        observation: Option<Bound<'_, PyAny>>,
+        #[pyo3(from_py_with = named)] dt: f64,
+    ) -> Outcome<f64> {
         Ok(self.advanced(py, observation.as_ref(), dt)?.0)
     }
 
@@ -101,7 +147,12 @@ impl EnsembleFilter {
     /// >>> level.run(pl.DataFrame({"t": [0.0, 1.0, 3.0], "a": [1.2, None, 1.5]}), time="t").columns
     /// ['t', 'x0', 'x0_sd', 'log_likelihood', 'bits']
     #[pyo3(signature = (table, *, time))]
-    fn run(&mut self, py: Python<'_>, table: &Bound<'_, PyAny>, time: &str) -> Outcome<Table> {
+    fn run(
+        &mut self,
+        py: Python<'_>,
+        table: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = named)] time: &str,
+    ) -> Outcome<Table> {
         let given = Given::read(table)?;
         let seconds = rising(&given.times(time)?)?;
         let columns = self.measures.columns(&given, time)?;

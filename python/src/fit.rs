@@ -2,6 +2,7 @@
 
 use crate::centre::FusionCentre;
 use crate::error::{Outcome, refused};
+use crate::given::named;
 use crate::instants::{self, Long};
 use crate::model::Model;
 use crate::parts::{Parts, Tests};
@@ -59,14 +60,14 @@ pub(crate) struct Fit {
 pub(crate) fn fit(
     py: Python<'_>,
     table: &Bound<'_, PyAny>,
-    time: &str,
-    by: Option<&str>,
-    value: Option<&str>,
-    sensors: Option<Vec<String>>,
-    reference: Option<String>,
-    find: Vec<String>,
-    bits: Vec<String>,
-    noise: BTreeMap<String, f64>,
+    #[pyo3(from_py_with = named)] time: &str,
+    #[pyo3(from_py_with = named)] by: Option<&str>,
+    #[pyo3(from_py_with = named)] value: Option<&str>,
+    #[pyo3(from_py_with = named)] sensors: Option<Vec<String>>,
+    #[pyo3(from_py_with = named)] reference: Option<String>,
+    #[pyo3(from_py_with = named)] find: Vec<String>,
+    #[pyo3(from_py_with = named)] bits: Vec<String>,
+    #[pyo3(from_py_with = named)] noise: BTreeMap<String, f64>,
 ) -> Outcome<Fit> {
     let given = Given::read(table)?;
     let long = match (by, value) {
@@ -272,7 +273,14 @@ impl Fit {
     ///
     /// Raises `fewbits.ArgumentError` if a sensor has what a centre does not know: a slope, a walk, a delay, or bits of its own.
     #[pyo3(signature = (*, send="value", learn_noise=true, health="exclude", failures=1e-4, window=0.0))]
-    fn centre(&self, send: &str, learn_noise: bool, health: &str, failures: f64, window: f64) -> Outcome<FusionCentre> {
+    fn centre(
+        &self,
+        #[pyo3(from_py_with = named)] send: &str,
+        #[pyo3(from_py_with = named)] learn_noise: bool,
+        #[pyo3(from_py_with = named)] health: &str,
+        #[pyo3(from_py_with = named)] failures: f64,
+        #[pyo3(from_py_with = named)] window: f64,
+    ) -> Outcome<FusionCentre> {
         let send = Sends::parsed(send)?;
         let sensors = self.names.iter().zip(&self.found.model.sensors).zip(&self.bits);
         let seats = sensors.map(|((name, sensor), bits)| {

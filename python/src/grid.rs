@@ -2,7 +2,9 @@
 
 use crate::callbacks::{Likelihoods, returned, rising};
 use crate::error::{Outcome, refused};
-use crate::nodes::{Kept, callable, dt_of, step};
+use crate::given::named;
+use crate::nodes::{Kept, Parts, callable, dt_of, step};
+use crate::stored::{self, Reduced};
 use crate::table::{Given, Table, doubles};
 use fewbits_filters::{PointMass, TransitionKernel, UniformGrid};
 use numpy::PyArray1;
@@ -40,9 +42,9 @@ impl GridFilter {
         mean: &Bound<'_, PyAny>,
         deviation: &Bound<'_, PyAny>,
         likelihood: &Bound<'_, PyAny>,
-        lower: f64,
-        upper: f64,
-        spacing: f64,
+        #[pyo3(from_py_with = named)] lower: f64,
+        #[pyo3(from_py_with = named)] upper: f64,
+        #[pyo3(from_py_with = named)] spacing: f64,
         start: &Bound<'_, PyAny>,
     ) -> Outcome<Self> {
         callable("mean", mean)?;
@@ -70,10 +72,37 @@ impl GridFilter {
         })
     }
 
+    #[staticmethod]
+    fn _restored(
+        mean: Py<PyAny>,
+        deviation: Py<PyAny>,
+        likelihood: &Bound<'_, PyAny>,
+        state: &Bound<'_, PyAny>,
+    ) -> Outcome<Self> {
+        Ok(Self {
+            mean,
+            deviation,
+            likelihoods: Likelihoods::parsed("likelihood", likelihood)?,
+            belief: stored::state(state)?,
+            kernel: None,
+        })
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Outcome<Reduced<'py, Parts<'py>>> {
+        let (mean, deviation) = (self.mean.bind(py).clone(), self.deviation.bind(py).clone());
+        let parts = (mean, deviation, self.likelihoods.given(py)?, stored::bytes(py, &self.belief)?);
+        Ok((stored::maker::<Self>(py)?, parts))
+    }
+
     /// Prediction over `dt` seconds (none if 0) and update by the observation (none if None or NaN). Returns the log likelihood. With
     /// likelihoods by name the observation is a dictionary. A step that fails leaves the density as it was.
     #[pyo3(signature = (observation=None, *, dt=1.0))]
-    fn step(&mut self, py: Python<'_>, observation: Option<Bound<'_, PyAny>>, dt: f64) -> Outcome<f64> {
+    fn step(
+        &mut self,
+        py: Python<'_>,
+        observation: Option<Bound<'_, PyAny>>,
+        #[pyo3(from_py_with = named)] dt: f64,
+    ) -> Outcome<f64> {
         let nodes = self.nodes(py).into_any();
         let moved = |belief: &PointMass| moved(py, &self.mean, &self.deviation, belief.grid(), dt);
         let of = (dt, &nodes);
@@ -92,7 +121,12 @@ impl GridFilter {
     /// >>> grid.run(pl.DataFrame({"t": [0.0, 1.0, 2.0], "alarm": [1, None, 1]}), time="t").columns
     /// ['t', 'x0', 'x0_sd', 'log_likelihood']
     #[pyo3(signature = (table, *, time))]
-    fn run(&mut self, py: Python<'_>, table: &Bound<'_, PyAny>, time: &str) -> Outcome<Table> {
+    fn run(
+        &mut self,
+        py: Python<'_>,
+        table: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = named)] time: &str,
+    ) -> Outcome<Table> {
         let given = Given::read(table)?;
         let seconds = rising(&given.times(time)?)?;
         let columns = self.likelihoods.columns(&given, time)?;

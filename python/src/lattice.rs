@@ -3,7 +3,9 @@
 use crate::array::{matrix, vector};
 use crate::callbacks::{Likelihoods, rising};
 use crate::error::{Failure, Outcome, refused};
-use crate::nodes::{Kept, callable, dt_of, step};
+use crate::given::named;
+use crate::nodes::{Kept, Parts, callable, dt_of, step};
+use crate::stored::{self, Reduced};
 use crate::table::{Given, Table, doubles};
 use fewbits_filters::{Lattice, LatticeKernel as Kernel, UniformGrid};
 use numpy::{PyArray1, PyArray2};
@@ -76,10 +78,39 @@ impl LatticeFilter {
         })
     }
 
+    #[staticmethod]
+    fn _restored(
+        mean: Py<PyAny>,
+        deviation: Py<PyAny>,
+        likelihood: &Bound<'_, PyAny>,
+        state: &Bound<'_, PyAny>,
+    ) -> Outcome<Self> {
+        let (axes, density): (Vec<UniformGrid>, Vec<f64>) = stored::state(state)?;
+        Ok(Self {
+            mean,
+            deviation,
+            likelihoods: Likelihoods::parsed("likelihood", likelihood)?,
+            belief: Lattice::uniform(axes)?.with_density(density)?,
+            kernel: None,
+        })
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Outcome<Reduced<'py, Parts<'py>>> {
+        let (mean, deviation) = (self.mean.bind(py).clone(), self.deviation.bind(py).clone());
+        let state = stored::bytes(py, &(self.belief.axes(), self.belief.density()))?;
+        let parts = (mean, deviation, self.likelihoods.given(py)?, state);
+        Ok((stored::maker::<Self>(py)?, parts))
+    }
+
     /// Prediction over `dt` seconds (none if 0) and update by the observation (none if None or NaN). Returns the log likelihood. With
     /// likelihoods by name the observation is a dictionary. A step that fails leaves the density as it was.
     #[pyo3(signature = (observation=None, *, dt=1.0))]
-    fn step(&mut self, py: Python<'_>, observation: Option<Bound<'_, PyAny>>, dt: f64) -> Outcome<f64> {
+    fn step(
+        &mut self,
+        py: Python<'_>,
+        observation: Option<Bound<'_, PyAny>>,
+        #[pyo3(from_py_with = named)] dt: f64,
+    ) -> Outcome<f64> {
         let nodes = self.nodes(py)?.into_any();
         let moved = |belief: &Lattice| moved(py, &self.mean, &self.deviation, belief, dt);
         let of = (dt, &nodes);
@@ -89,7 +120,12 @@ impl LatticeFilter {
     /// One step per row of a table, its column `time` in seconds or timestamps; null and NaN are missing. The first row is the time of the
     /// start. The result has mean and deviation of each coordinate.
     #[pyo3(signature = (table, *, time))]
-    fn run(&mut self, py: Python<'_>, table: &Bound<'_, PyAny>, time: &str) -> Outcome<Table> {
+    fn run(
+        &mut self,
+        py: Python<'_>,
+        table: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = named)] time: &str,
+    ) -> Outcome<Table> {
         let given = Given::read(table)?;
         let seconds = rising(&given.times(time)?)?;
         let columns = self.likelihoods.columns(&given, time)?;
@@ -134,7 +170,11 @@ impl LatticeFilter {
     /// ... )
     /// >>> still.marginal(1).shape, round(float(still.marginal(1).sum()), 6)
     /// ((9,), 1.0)
-    fn marginal<'py>(&self, py: Python<'py>, coordinate: usize) -> Outcome<Bound<'py, PyArray1<f64>>> {
+    fn marginal<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = named)] coordinate: usize,
+    ) -> Outcome<Bound<'py, PyArray1<f64>>> {
         let axes = self.belief.axes().len();
         if coordinate >= axes {
             return refused("coordinate", coordinate, format!("0 to {}", axes - 1));

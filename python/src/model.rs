@@ -2,6 +2,8 @@
 
 use crate::array::{matrix, vector};
 use crate::error::{Outcome, refused};
+use crate::given::{named, of_class};
+use crate::stored::{self, Reduced};
 use fewbits_core::{Dynamics, Evolution, GaussianDynamics};
 use fewbits_models::{AffineGaussian, ContinuousLinear};
 use fewbits_monte_carlo::Stream;
@@ -10,6 +12,7 @@ use fewbits_numerics::error::positive;
 use nalgebra::{SMatrix, SVector};
 use numpy::PyArray2;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use serde::{Deserialize, Serialize};
 use std::sync::{Mutex, PoisonError};
 
@@ -166,7 +169,7 @@ impl Model {
     /// >>> fb.Model.walk(0.1).dimension
     /// 1
     #[staticmethod]
-    fn walk(density: f64) -> Outcome<Self> {
+    fn walk(#[pyo3(from_py_with = named)] density: f64) -> Outcome<Self> {
         Ok(Self::of(ContinuousLinear::random_walk(density)?))
     }
 
@@ -177,7 +180,11 @@ impl Model {
     /// 1
     #[staticmethod]
     #[pyo3(signature = (*, mean, time_constant, variance))]
-    fn reverting(mean: f64, time_constant: f64, variance: f64) -> Outcome<Self> {
+    fn reverting(
+        #[pyo3(from_py_with = named)] mean: f64,
+        #[pyo3(from_py_with = named)] time_constant: f64,
+        #[pyo3(from_py_with = named)] variance: f64,
+    ) -> Outcome<Self> {
         Ok(Self::of(ContinuousLinear::ornstein_uhlenbeck(mean, time_constant, variance)?))
     }
 
@@ -187,7 +194,7 @@ impl Model {
     /// >>> fb.Model.velocity(0.1).dimension
     /// 2
     #[staticmethod]
-    fn velocity(density: f64) -> Outcome<Self> {
+    fn velocity(#[pyo3(from_py_with = named)] density: f64) -> Outcome<Self> {
         Ok(Self::of(ContinuousLinear::nearly_constant_velocity(density)?))
     }
 
@@ -197,7 +204,7 @@ impl Model {
     /// >>> fb.Model.acceleration(0.1).dimension
     /// 3
     #[staticmethod]
-    fn acceleration(density: f64) -> Outcome<Self> {
+    fn acceleration(#[pyo3(from_py_with = named)] density: f64) -> Outcome<Self> {
         Ok(Self::of(ContinuousLinear::nearly_constant_acceleration(density)?))
     }
 
@@ -207,7 +214,7 @@ impl Model {
     /// >>> fb.Model.plane(0.1).dimension
     /// 4
     #[staticmethod]
-    fn plane(density: f64) -> Outcome<Self> {
+    fn plane(#[pyo3(from_py_with = named)] density: f64) -> Outcome<Self> {
         Ok(Self::of(ContinuousLinear::nearly_constant_velocity_2d(density)?))
     }
 
@@ -247,7 +254,7 @@ impl Model {
         transition: &Bound<'_, PyAny>,
         noise: &Bound<'_, PyAny>,
         offset: Option<&Bound<'_, PyAny>>,
-        interval: f64,
+        #[pyo3(from_py_with = named)] interval: f64,
     ) -> Outcome<Self> {
         let (dimension, _, _) = matrix("transition", transition)?;
         let offset = offset.map(|given| vector("offset", given)).transpose()?;
@@ -266,7 +273,7 @@ impl Model {
     /// >>> import fewbits as fb
     /// >>> fb.Model.velocity(0.1).beside(fb.Model.walk(0.01)).dimension
     /// 3
-    fn beside(&self, other: &Bound<'_, Self>) -> Outcome<Self> {
+    fn beside(&self, #[pyo3(from_py_with = of_class)] other: &Bound<'_, Self>) -> Outcome<Self> {
         let other = other.get();
         if self.interval != other.interval {
             let shown = |model: &Self| match model.interval {
@@ -295,6 +302,15 @@ impl Model {
         model.checked()
     }
 
+    #[staticmethod]
+    fn _restored(state: &Bound<'_, PyAny>) -> Outcome<Self> {
+        stored::state::<Self>(state)?.checked()
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Outcome<Reduced<'py, (Bound<'py, PyBytes>,)>> {
+        Ok((stored::maker::<Self>(py)?, (stored::bytes(py, self)?,)))
+    }
+
     /// Number of coordinates.
     ///
     /// >>> import fewbits as fb
@@ -316,7 +332,7 @@ impl Model {
         py: Python<'py>,
         times: &Bound<'py, PyAny>,
         start: &Bound<'py, PyAny>,
-        seed: u64,
+        #[pyo3(from_py_with = named)] seed: u64,
     ) -> Outcome<Bound<'py, PyArray2<f64>>> {
         let (times, start) = (vector("times", times)?, sized("start", vector("start", start)?, self.dimension)?);
         let path = py.detach(|| with_dimension!(self.dimension, D => self.path::<D>(&times, &start, seed)))?;

@@ -4,6 +4,7 @@ use crate::callbacks::{Likelihoods, returned};
 use crate::error::{Outcome, refused};
 use fewbits_filters::{Error, Lattice, LatticeKernel, PointMass, TransitionKernel};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 /// A density at nodes, and the kernel that moves it.
 pub(crate) trait OnNodes: Clone + Send + Sync {
@@ -40,6 +41,9 @@ impl OnNodes for Lattice {
         self.update(logs)
     }
 }
+
+/// The functions of a filter, and its state.
+pub(crate) type Parts<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyBytes>);
 
 /// The kernel of the last step, and its seconds.
 pub(crate) type Kept<K> = Option<(f64, K)>;

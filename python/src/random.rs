@@ -2,13 +2,17 @@
 
 use crate::array::{line, shown, vector};
 use crate::error::{Outcome, refused};
+use crate::given::named;
+use crate::stored::{self, Reduced};
 use fewbits_filters::Resampling;
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::kernels::StandardNormals;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
+use serde::{Deserialize, Serialize};
 
 /// Numbers that are drawn together.
 const BLOCK: usize = 512;
@@ -27,7 +31,29 @@ pub(crate) struct Generator {
     uniforms: Pcg64Mcg,
 }
 
+/// What a generator is, to be stored.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct State {
+    normals: [u64; 2],
+    uniforms: Pcg64Mcg,
+}
+
 impl Generator {
+    pub(crate) fn state(&self) -> State {
+        State {
+            normals: self.normals.state(),
+            uniforms: self.uniforms.clone(),
+        }
+    }
+
+    pub(crate) fn restored(state: State) -> Outcome<Self> {
+        let State { normals, uniforms } = state;
+        match StandardNormals::from_state(normals) {
+            Some(normals) => Ok(Self { normals, uniforms }),
+            None => refused("state", "that of no generator", "the state of a generator"),
+        }
+    }
+
     pub(crate) fn of(seed: u64) -> Self {
         let mut rng = Stream::new(seed).fast_rng();
         Self {
@@ -40,12 +66,25 @@ impl Generator {
 #[pymethods]
 impl Generator {
     #[new]
-    fn new(seed: u64) -> Self {
+    fn new(#[pyo3(from_py_with = named)] seed: u64) -> Self {
         Self::of(seed)
     }
 
+    #[staticmethod]
+    fn _restored(state: &Bound<'_, PyAny>) -> Outcome<Self> {
+        Self::restored(stored::state(state)?)
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Outcome<Reduced<'py, (Bound<'py, PyBytes>,)>> {
+        Ok((stored::maker::<Self>(py)?, (stored::bytes(py, &self.state())?,)))
+    }
+
     /// `count` independent standard normal numbers.
-    fn standard_normal<'py>(&mut self, py: Python<'py>, count: usize) -> Outcome<Bound<'py, PyArray1<f64>>> {
+    fn standard_normal<'py>(
+        &mut self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = named)] count: usize,
+    ) -> Outcome<Bound<'py, PyArray1<f64>>> {
         let mut normals = vec![0.0; checked(count)?];
         self.normals.fill(&mut normals);
         Ok(PyArray1::from_vec(py, normals))
@@ -61,7 +100,7 @@ impl Generator {
     /// >>> fb.Generator(1).add_normal(x[1], 0.5)
     /// >>> bool(x[0].std() == 0), bool(abs(x[1].std() - 0.5) < 0.05)
     /// (True, True)
-    fn add_normal(&mut self, array: &Bound<'_, PyAny>, deviation: f64) -> Outcome<()> {
+    fn add_normal(&mut self, array: &Bound<'_, PyAny>, #[pyo3(from_py_with = named)] deviation: f64) -> Outcome<()> {
         if !(deviation >= 0.0 && deviation.is_finite()) {
             return refused("deviation", deviation, "a finite number, 0 or above");
         }
@@ -96,7 +135,11 @@ impl Generator {
     }
 
     /// `count` independent numbers, uniform in [0, 1).
-    fn random<'py>(&mut self, py: Python<'py>, count: usize) -> Outcome<Bound<'py, PyArray1<f64>>> {
+    fn random<'py>(
+        &mut self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = named)] count: usize,
+    ) -> Outcome<Bound<'py, PyArray1<f64>>> {
         let uniforms = (0..checked(count)?).map(|_| self.uniforms.random()).collect();
         Ok(PyArray1::from_vec(py, uniforms))
     }
@@ -139,9 +182,9 @@ pub(crate) fn normalise<'py>(
 pub(crate) fn resample<'py>(
     py: Python<'py>,
     weights: &Bound<'py, PyAny>,
-    count: Option<usize>,
-    scheme: &str,
-    seed: u64,
+    #[pyo3(from_py_with = named)] count: Option<usize>,
+    #[pyo3(from_py_with = named)] scheme: &str,
+    #[pyo3(from_py_with = named)] seed: u64,
 ) -> Outcome<Bound<'py, PyArray1<i64>>> {
     let weights = line::<f64>("weights", weights)?;
     let weights = weights.as_slice().map_err(PyErr::from)?;

@@ -1,6 +1,8 @@
 //! A target from the ranges of fixed anchors, over a table.
 
 use crate::error::{Outcome, refused};
+use crate::given::named;
+use crate::stored::{Reduced, maker};
 use crate::table::{Given, Table};
 use arrow_array::{ArrayRef, BooleanArray, Float64Array};
 use fewbits_pf_mpa::{RangeEstimate, RangeSettings, Travel};
@@ -31,7 +33,12 @@ pub(crate) struct RangeTracker {
     anchors: BTreeMap<String, (f64, f64)>,
     travel: Travel,
     settings: RangeSettings,
+    /// What `send` said.
+    send: String,
 }
+
+/// Anchors, what is sent, and the numbers, as in the constructor.
+type Parts = (BTreeMap<String, (f64, f64)>, String, [f64; 8]);
 
 #[pymethods]
 impl RangeTracker {
@@ -39,16 +46,16 @@ impl RangeTracker {
     #[pyo3(signature = (anchors, *, send="value", noise=1.8, noise_factor=4.0, speed=1.0, speed_factor=4.0, persistence=6.0, outliers=0.02, bias=5.0, silence=30.0))]
     #[allow(clippy::too_many_arguments)]
     fn new(
-        anchors: BTreeMap<String, (f64, f64)>,
-        send: &str,
-        noise: f64,
-        noise_factor: f64,
-        speed: f64,
-        speed_factor: f64,
-        persistence: f64,
-        outliers: f64,
-        bias: f64,
-        silence: f64,
+        #[pyo3(from_py_with = named)] anchors: BTreeMap<String, (f64, f64)>,
+        #[pyo3(from_py_with = named)] send: &str,
+        #[pyo3(from_py_with = named)] noise: f64,
+        #[pyo3(from_py_with = named)] noise_factor: f64,
+        #[pyo3(from_py_with = named)] speed: f64,
+        #[pyo3(from_py_with = named)] speed_factor: f64,
+        #[pyo3(from_py_with = named)] persistence: f64,
+        #[pyo3(from_py_with = named)] outliers: f64,
+        #[pyo3(from_py_with = named)] bias: f64,
+        #[pyo3(from_py_with = named)] silence: f64,
     ) -> Outcome<Self> {
         let bits = send.strip_prefix("word:").and_then(|bits| bits.parse().ok());
         let travel = match (send, bits) {
@@ -71,9 +78,41 @@ impl RangeTracker {
             anchors,
             travel,
             settings,
+            send: send.to_owned(),
         };
         made.tracker()?;
         Ok(made)
+    }
+
+    #[staticmethod]
+    fn _restored(anchors: BTreeMap<String, (f64, f64)>, send: &str, numbers: [f64; 8]) -> Outcome<Self> {
+        let [
+            noise,
+            noise_factor,
+            speed,
+            speed_factor,
+            persistence,
+            outliers,
+            bias,
+            silence,
+        ] = numbers;
+        Self::new(anchors, send, noise, noise_factor, speed, speed_factor, persistence, outliers, bias, silence)
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py, Parts>> {
+        let of = &self.settings;
+        let set = |number: Option<f64>| number.unwrap_or(f64::NAN);
+        let numbers = [
+            set(of.noise),
+            set(of.noise_factor),
+            set(of.speed),
+            set(of.speed_factor),
+            of.persistence,
+            of.outliers,
+            set(of.bias),
+            of.silence,
+        ];
+        Ok((maker::<Self>(py)?, (self.anchors.clone(), self.send.clone(), numbers)))
     }
 
     /// The path over a table of one range a row: its time, the anchor's name in column `by`, the range in metres in column `value`. A range
@@ -81,7 +120,14 @@ impl RangeTracker {
     ///
     /// The result has a row per range: position, deviations, covariance of x and y, bias, noise and speed, which are null while there are too few
     /// ranges for a position, and whether the track was lost at that row. Each run begins anew.
-    fn run(&self, py: Python<'_>, table: &Bound<'_, PyAny>, time: &str, by: &str, value: &str) -> Outcome<Table> {
+    fn run(
+        &self,
+        py: Python<'_>,
+        table: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = named)] time: &str,
+        #[pyo3(from_py_with = named)] by: &str,
+        #[pyo3(from_py_with = named)] value: &str,
+    ) -> Outcome<Table> {
         let given = Given::read(table)?;
         let seconds = crate::callbacks::rising(&given.times(time)?)?;
         let (names, cells) = (given.texts(by)?, given.numbers(value)?);

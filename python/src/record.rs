@@ -2,6 +2,7 @@
 
 use crate::clock::clock;
 use crate::error::{Outcome, refused};
+use crate::given::named;
 use crate::table::{Cells, Given, Table, doubles};
 use arrow_array::{ArrayRef, StringArray};
 use arrow_schema::DataType;
@@ -184,10 +185,10 @@ impl Taken {
 pub(crate) fn write(
     py: Python<'_>,
     table: &Bound<'_, PyAny>,
-    path: PathBuf,
-    time: Option<&str>,
-    bounds: Stated,
-    effort: &str,
+    #[pyo3(from_py_with = named)] path: PathBuf,
+    #[pyo3(from_py_with = named)] time: Option<&str>,
+    #[pyo3(from_py_with = named)] bounds: Stated,
+    #[pyo3(from_py_with = named)] effort: &str,
 ) -> Outcome<u64> {
     let effort = crate::codec::effort(effort)?;
     let taken = Taken::of(&Given::read(table)?, time)?;
@@ -239,7 +240,11 @@ pub(crate) fn opened(path: &Path) -> Outcome<Playback<BufReader<File>>> {
 /// (['column', 'share', 'bound', 'bits'], 8)
 #[pyfunction]
 #[pyo3(signature = (table, *, time=None))]
-pub(crate) fn plan(py: Python<'_>, table: &Bound<'_, PyAny>, time: Option<&str>) -> Outcome<Table> {
+pub(crate) fn plan(
+    py: Python<'_>,
+    table: &Bound<'_, PyAny>,
+    #[pyo3(from_py_with = named)] time: Option<&str>,
+) -> Outcome<Table> {
     let taken = Taken::of(&Given::read(table)?, time)?;
     let (names, base) = (taken.names.clone(), taken.time);
     // Codes are distances from the smallest number where these are doubles.
@@ -297,8 +302,8 @@ pub(crate) fn plan(py: Python<'_>, table: &Bound<'_, PyAny>, time: Option<&str>)
 pub(crate) fn verify<'py>(
     py: Python<'py>,
     table: &Bound<'py, PyAny>,
-    path: PathBuf,
-    time: Option<&str>,
+    #[pyo3(from_py_with = named)] path: PathBuf,
+    #[pyo3(from_py_with = named)] time: Option<&str>,
 ) -> Outcome<Bound<'py, PyDict>> {
     let mut playback = opened(&path)?;
     let mut taken = Taken::of(&Given::read(table)?, time)?;

@@ -2,6 +2,7 @@
 
 use crate::clock::{MAX_DECIMALS, ticked};
 use crate::error::{Failure, Outcome, refused};
+use crate::given::{named, of_class_or_none};
 use crate::record::Stated;
 use crate::table::Given;
 use fewbits_recipes::bounds;
@@ -35,13 +36,13 @@ impl Recorder {
     #[pyo3(signature = (path, bounds=None, *, time=None, decimals=None, utc=false, effort="thorough", resume=false))]
     #[allow(clippy::too_many_arguments)]
     fn new(
-        path: PathBuf,
-        bounds: Option<&Bound<'_, PyDict>>,
-        time: Option<&str>,
-        decimals: Option<u8>,
-        utc: bool,
-        effort: &str,
-        resume: bool,
+        #[pyo3(from_py_with = named)] path: PathBuf,
+        #[pyo3(from_py_with = of_class_or_none)] bounds: Option<&Bound<'_, PyDict>>,
+        #[pyo3(from_py_with = named)] time: Option<&str>,
+        #[pyo3(from_py_with = named)] decimals: Option<u8>,
+        #[pyo3(from_py_with = named)] utc: bool,
+        #[pyo3(from_py_with = named)] effort: &str,
+        #[pyo3(from_py_with = named)] resume: bool,
     ) -> Outcome<Self> {
         let effort = crate::codec::effort(effort)?;
         let recorder = match (bounds, resume) {
@@ -90,7 +91,11 @@ impl Recorder {
 
     /// Adds a row: its time (seconds, or what `numpy.datetime64` takes; the number of the row, or None for the next, if rows are numbered)
     /// and its cells by column. Cells that are None or left out are gaps.
-    fn push(&mut self, time: &Bound<'_, PyAny>, cells: BTreeMap<String, Option<f64>>) -> Outcome<()> {
+    fn push(
+        &mut self,
+        time: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = named)] cells: BTreeMap<String, Option<f64>>,
+    ) -> Outcome<()> {
         let recorder = self.open()?;
         let schema = recorder.schema().clone();
         for name in cells.keys() {

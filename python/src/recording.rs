@@ -2,6 +2,7 @@
 
 use crate::clock;
 use crate::error::{Outcome, refused};
+use crate::given::named;
 use crate::record::opened;
 use crate::recorder::tick_of;
 use crate::table::{Table, joined};
@@ -69,7 +70,11 @@ impl Damaged {
 /// FileNotFoundError: No such file or directory (os error 2)
 #[pyfunction]
 #[pyo3(signature = (path, *, damage="raise"))]
-pub(crate) fn open(py: Python<'_>, path: PathBuf, damage: &str) -> Outcome<Recording> {
+pub(crate) fn open(
+    py: Python<'_>,
+    #[pyo3(from_py_with = named)] path: PathBuf,
+    #[pyo3(from_py_with = named)] damage: &str,
+) -> Outcome<Recording> {
     let damaged = Damaged::parsed(damage)?;
     py.detach(|| {
         let mut playback = opened(&path)?;
@@ -150,7 +155,7 @@ impl Recording {
     #[pyo3(signature = (columns=None, *, start=None, end=None))]
     fn select(
         &self,
-        columns: Option<Vec<String>>,
+        #[pyo3(from_py_with = named)] columns: Option<Vec<String>>,
         start: Option<&Bound<'_, PyAny>>,
         end: Option<&Bound<'_, PyAny>>,
     ) -> Outcome<Rows> {
@@ -363,11 +368,11 @@ fn keep_between(block: &mut Block, from: i64, to: i64) {
 #[pyo3(signature = (path, *, columns=None, start=None, end=None, damage="raise"))]
 pub(crate) fn read(
     py: Python<'_>,
-    path: PathBuf,
-    columns: Option<Vec<String>>,
+    #[pyo3(from_py_with = named)] path: PathBuf,
+    #[pyo3(from_py_with = named)] columns: Option<Vec<String>>,
     start: Option<&Bound<'_, PyAny>>,
     end: Option<&Bound<'_, PyAny>>,
-    damage: &str,
+    #[pyo3(from_py_with = named)] damage: &str,
 ) -> Outcome<Table> {
     open(py, path, damage)?.select(columns, start, end)?.read(py)
 }

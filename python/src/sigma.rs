@@ -3,8 +3,10 @@
 use crate::array::{matrix, shown, vector};
 use crate::callbacks::{Likelihoods, returned, rising};
 use crate::error::{Failure, Outcome, refused};
+use crate::given::named;
 use crate::model::{square, with_dimension};
 use crate::seat::Sends;
+use crate::stored::{self, Reduced};
 use crate::table::{Given, Table, doubles};
 use arrow_array::Int64Array;
 use fewbits_core::factor::{Scalar, Value};
@@ -15,13 +17,27 @@ use fewbits_monte_carlo::Stream;
 use nalgebra::{SMatrix, SVector, Vector1};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict};
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// What is known of the sensor of a column.
+#[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct Sensor {
     variance: f64,
     send: Sends,
+}
+
+impl Sensor {
+    /// Whether it can be a stored one.
+    pub(crate) fn is_valid(&self) -> bool {
+        let sends = match self.send {
+            Sends::Word(bits) => (2..=4).contains(&bits),
+            Sends::Silent(_) => false,
+            _ => true,
+        };
+        sends && self.variance > 0.0 && self.variance.is_finite()
+    }
 }
 
 /// The sensors of these columns: their noises, and what they send.
@@ -60,6 +76,9 @@ trait Rule: Send + Sync {
     fn update(&mut self, measure: Measure<'_>, sensor: &Sensor, sample: f64) -> Outcome<(f64, i64)>;
 
     fn moments(&self) -> (Vec<f64>, Vec<Vec<f64>>);
+
+    /// The belief as bytes.
+    fn stored(&self) -> Outcome<Vec<u8>>;
 }
 
 type Change<'a> = &'a mut dyn FnMut(&mut [&mut [f64]]) -> Outcome<()>;
@@ -112,6 +131,14 @@ impl<const D: usize> Rule for Points<D> {
         let rows = (0..D).map(|i| (0..D).map(|j| covariance[(i, j)]).collect()).collect();
         (belief.mean().as_slice().to_vec(), rows)
     }
+
+    fn stored(&self) -> Outcome<Vec<u8>> {
+        let mut bytes = Vec::new();
+        match ciborium::into_writer(&self.belief, &mut bytes) {
+            Ok(()) => Ok(bytes),
+            Err(error) => refused("state", error, "a belief that can be stored"),
+        }
+    }
 }
 
 /// What the receiver learns of a sample under the predicted noise-free measurement, and the bits that it takes.
@@ -163,8 +190,23 @@ pub(crate) struct SigmaPointFilter {
     sensors: Vec<Sensor>,
     process: Process,
     dimension: usize,
+    kappa: f64,
     rule: Box<dyn Rule>,
 }
+
+/// What a filter is besides its functions, to be stored.
+#[derive(Serialize, Deserialize)]
+struct State {
+    sensors: Vec<Sensor>,
+    /// Of a process that is no function.
+    density: Option<Vec<f64>>,
+    dimension: usize,
+    kappa: f64,
+    belief: Vec<u8>,
+}
+
+/// The functions, one of them perhaps `None`, and the state.
+type Parts<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Option<Bound<'py, PyAny>>, Bound<'py, PyBytes>);
 
 enum Process {
     /// After a second, by columns.
@@ -185,8 +227,8 @@ impl SigmaPointFilter {
         mean: &Bound<'_, PyAny>,
         deviation: Option<&Bound<'_, PyAny>>,
         covariance: Option<&Bound<'_, PyAny>>,
-        rule: &str,
-        kappa: Option<f64>,
+        #[pyo3(from_py_with = named)] rule: &str,
+        #[pyo3(from_py_with = named)] kappa: Option<f64>,
         send: Option<&Bound<'_, PyAny>>,
     ) -> Outcome<Self> {
         if !r#move.is_callable() {
@@ -217,14 +259,77 @@ impl SigmaPointFilter {
             sensors,
             process,
             dimension,
+            kappa,
             rule,
         })
+    }
+
+    #[staticmethod]
+    fn _restored(
+        r#move: Py<PyAny>,
+        measure: &Bound<'_, PyAny>,
+        process: Option<Py<PyAny>>,
+        state: &Bound<'_, PyAny>,
+    ) -> Outcome<Self> {
+        let State {
+            sensors,
+            density,
+            dimension,
+            kappa,
+            belief,
+        } = stored::state(state)?;
+        let measures = Likelihoods::parsed("measure", measure)?;
+        let process = match (process, density) {
+            (Some(function), None) => Process::Function(function),
+            (None, Some(density)) if density.len() == dimension * dimension => Process::Density(density),
+            _ => return refused("state", "without a process", "that of a sigma point filter"),
+        };
+        if sensors.len() != measures.names().len() || !sensors.iter().all(Sensor::is_valid) {
+            return refused("state", format!("{} sensors", sensors.len()), "that of a sigma point filter");
+        }
+        let rule: Box<dyn Rule> = with_dimension!(dimension, D => {
+            let belief: RootGaussian<D> = match ciborium::from_reader(&belief[..]) {
+                Ok(belief) => belief,
+                Err(error) => return refused("state", error, "that of a sigma point filter"),
+            };
+            Ok::<Box<dyn Rule>, Failure>(Box::new(Points::<D> { filter: Filter::unscented(kappa)?, belief }))
+        })?;
+        Ok(Self {
+            transition: r#move,
+            measures,
+            sensors,
+            process,
+            dimension,
+            kappa,
+            rule,
+        })
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Outcome<Reduced<'py, Parts<'py>>> {
+        let (density, function) = match &self.process {
+            Process::Density(density) => (Some(density.clone()), None),
+            Process::Function(function) => (None, Some(function.bind(py).clone())),
+        };
+        let state = State {
+            sensors: self.sensors.clone(),
+            density,
+            dimension: self.dimension,
+            kappa: self.kappa,
+            belief: self.rule.stored()?,
+        };
+        let parts = (self.transition.bind(py).clone(), self.measures.given(py)?, function, stored::bytes(py, &state)?);
+        Ok((stored::maker::<Self>(py)?, parts))
     }
 
     /// Moves the belief by `dt` seconds (not if 0) and updates it by the observation (not if None or NaN). Returns the log likelihood. With
     /// measurements by name the observation is a dictionary. A step that fails, in a function of yours too, leaves the belief as it was.
     #[pyo3(signature = (observation=None, *, dt=1.0))]
-    fn step(&mut self, py: Python<'_>, observation: Option<Bound<'_, PyAny>>, dt: f64) -> Outcome<f64> {
+    fn step(
+        &mut self,
+        py: Python<'_>,
+        observation: Option<Bound<'_, PyAny>>,
+        #[pyo3(from_py_with = named)] dt: f64,
+    ) -> Outcome<f64> {
         Ok(self.advanced(py, observation.as_ref(), dt)?.0)
     }
 
@@ -238,7 +343,12 @@ impl SigmaPointFilter {
     /// >>> level.run(pl.DataFrame({"t": [0.0, 1.0, 3.0], "a": [1.2, None, 1.5]}), time="t").columns
     /// ['t', 'x0', 'x0_sd', 'log_likelihood', 'bits']
     #[pyo3(signature = (table, *, time))]
-    fn run(&mut self, py: Python<'_>, table: &Bound<'_, PyAny>, time: &str) -> Outcome<Table> {
+    fn run(
+        &mut self,
+        py: Python<'_>,
+        table: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = named)] time: &str,
+    ) -> Outcome<Table> {
         let given = Given::read(table)?;
         let seconds = rising(&given.times(time)?)?;
         let columns = self.measures.columns(&given, time)?;

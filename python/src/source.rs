@@ -1,7 +1,9 @@
 //! The search for a diffusing source: nodes that are asked one after the other.
 
-use crate::array::{matrix, vector};
+use crate::array::{matrix, shown, vector};
 use crate::error::{Outcome, refused};
+use crate::given::named;
+use crate::stored::{Reduced, maker};
 use crate::table::{Table, doubles};
 use arrow_array::{ArrayRef, Int64Array};
 use fewbits_diffusion::{Flow, Plan, PotentialFlow, Scheme, SensorField, StepControl, Transport};
@@ -66,6 +68,18 @@ pub(crate) struct SourceSearch {
     most: usize,
 }
 
+/// All that a search may end with.
+const STATUSES: [&str; 8] = [
+    "converged",
+    "exhausted",
+    "node limit",
+    "belief miss",
+    "misfit",
+    "undecodable",
+    "outside field",
+    "unresolved",
+];
+
 /// What a search found.
 #[pyclass(frozen, get_all, module = "fewbits")]
 pub(crate) struct SourceFound {
@@ -82,6 +96,44 @@ pub(crate) struct SourceFound {
     bits: usize,
 }
 
+type FoundParts<'py> = (
+    String,
+    Option<Bound<'py, PyArray1<f64>>>,
+    Option<Bound<'py, PyArray2<f64>>>,
+    Bound<'py, Table>,
+    usize,
+);
+
+#[pymethods]
+impl SourceFound {
+    #[staticmethod]
+    fn _restored(
+        status: &str,
+        mean: Option<Py<PyArray1<f64>>>,
+        covariance: Option<Py<PyArray2<f64>>>,
+        visited: Py<Table>,
+        bits: usize,
+    ) -> Outcome<Self> {
+        let Some(status) = STATUSES.iter().copied().find(|known| *known == status) else {
+            return refused("status", format!("'{status}'"), format!("one of {}", STATUSES.join(", ")));
+        };
+        Ok(Self {
+            status,
+            mean,
+            covariance,
+            visited,
+            bits,
+        })
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py, FoundParts<'py>>> {
+        let mean = self.mean.as_ref().map(|mean| mean.bind(py).clone());
+        let covariance = self.covariance.as_ref().map(|covariance| covariance.bind(py).clone());
+        let parts = (self.status.to_owned(), mean, covariance, self.visited.bind(py).clone(), self.bits);
+        Ok((maker::<Self>(py)?, parts))
+    }
+}
+
 #[pymethods]
 impl SourceSearch {
     #[new]
@@ -90,19 +142,19 @@ impl SourceSearch {
     fn new(
         py: Python<'_>,
         places: &Bound<'_, PyAny>,
-        reach: f64,
+        #[pyo3(from_py_with = named)] reach: f64,
         instants: &Bound<'_, PyAny>,
-        noise: f64,
-        diffusivity: f64,
-        wind: (f64, f64),
+        #[pyo3(from_py_with = named)] noise: f64,
+        #[pyo3(from_py_with = named)] diffusivity: f64,
+        #[pyo3(from_py_with = named)] wind: (f64, f64),
         rate: &Bound<'_, PyAny>,
-        r#box: ((f64, f64), (f64, f64)),
-        threshold: f64,
-        max_nodes: usize,
-        plan: Option<&str>,
-        square: f64,
-        split: usize,
-        flow: f64,
+        #[pyo3(from_py_with = named)] r#box: ((f64, f64), (f64, f64)),
+        #[pyo3(from_py_with = named)] threshold: f64,
+        #[pyo3(from_py_with = named)] max_nodes: usize,
+        #[pyo3(from_py_with = named)] plan: Option<&str>,
+        #[pyo3(from_py_with = named)] square: f64,
+        #[pyo3(from_py_with = named)] split: usize,
+        #[pyo3(from_py_with = named)] flow: f64,
     ) -> Outcome<Self> {
         let (rows, columns, numbers) = matrix("places", places)?;
         if columns != 2 {
@@ -157,7 +209,7 @@ impl SourceSearch {
     }
 
     /// The node nearest to a place.
-    fn nearest(&self, place: (f64, f64)) -> Outcome<usize> {
+    fn nearest(&self, #[pyo3(from_py_with = named)] place: (f64, f64)) -> Outcome<usize> {
         if !(place.0.is_finite() && place.1.is_finite()) {
             return refused("place", format!("{place:?}"), "finite numbers");
         }
@@ -171,7 +223,7 @@ impl SourceSearch {
         py: Python<'py>,
         place: &Bound<'py, PyAny>,
         source: &Bound<'py, PyAny>,
-        rate: f64,
+        #[pyo3(from_py_with = named)] rate: f64,
     ) -> Outcome<Bound<'py, PyArray1<f64>>> {
         let place = crate::model::sized("place", vector("place", place)?, 2)?;
         let source = crate::model::sized("source", vector("source", source)?, 2)?;
@@ -187,7 +239,16 @@ impl SourceSearch {
     /// Runs the search from node `start`, where the alarm was raised; the source is `deviation` metres from it, give or take. `samples(node)`
     /// returns what a node measures, one number per instant.
     #[pyo3(signature = (samples, *, start, deviation))]
-    fn run(&self, py: Python<'_>, samples: Py<PyAny>, start: usize, deviation: f64) -> Outcome<SourceFound> {
+    fn run(
+        &self,
+        py: Python<'_>,
+        samples: Py<PyAny>,
+        #[pyo3(from_py_with = named)] start: usize,
+        #[pyo3(from_py_with = named)] deviation: f64,
+    ) -> Outcome<SourceFound> {
+        if !samples.bind(py).is_callable() {
+            return refused("samples", shown(samples.bind(py)), "a function of a node's number");
+        }
         let search = self.about(start, deviation)?;
         let mut raised = None;
         let outcome = py.detach(|| {
@@ -230,7 +291,7 @@ impl SourceSearch {
             ("y_sd".to_owned(), number(|step| step.estimate.covariance()[(1, 1)].sqrt())),
         ])?;
         Ok(SourceFound {
-            status: named(outcome.status),
+            status: status_name(outcome.status),
             mean,
             covariance,
             bits: outcome.steps.iter().map(|step| step.bits).sum(),
@@ -281,7 +342,7 @@ impl SourceSearch {
     }
 }
 
-fn named(status: fewbits_diffusive::Status) -> &'static str {
+fn status_name(status: fewbits_diffusive::Status) -> &'static str {
     use fewbits_diffusive::Status;
     match status {
         Status::Converged => "converged",

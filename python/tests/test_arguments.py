@@ -326,3 +326,83 @@ def test_bytes_come_in_any_buffer():
             fb.decode(wrong)
     with pytest.raises(fb.ArgumentError, match="argument `bound` is ±0.1"):
         fb.encode([1.0], "±0.1")
+
+
+class Nothing:
+    """What is no number, no text, no array, no table and no function."""
+
+
+# What is chosen by another argument, or is whatever the caller's functions take.
+FREE = {"observation", "observations"}
+# What must be given besides.
+NEEDED = {
+    "OneBit": {"a": 0.9, "process": 0.5, "noise": 1.0},
+    "OneBit.run": {"mean": 0.0, "variance": 1.0},
+    "OneBit.run_bits": {"mean": 0.0, "variance": 1.0},
+    "OneBit.step": {"mean": 0.0, "variance": 1.0},
+    "Model.reverting": {"mean": 0.0, "time_constant": 1.0, "variance": 1.0},
+    "Model.simulate": {"start": [0.0, 0.0], "seed": 1},
+    "FusionCentre": {"deviation": 1.0},
+    "plan": {},
+}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_a_wrong_type_is_named(name):
+    function, positional, named = CALLS[name]
+    right = {
+        "samples": np.zeros(3), "frame": fb.encode([1.0]), "log_weights": np.zeros(3), "weights": np.ones(3), "bits": np.ones(3, "i1"), "bit": 1,
+        "density": 0.1, "drift": [[0.0]], "transition": [[1.0]], "noise": [[1.0]], "times": [0.0, 1.0], "column": "b", "time": 0.0, "bytes": b"",
+        "start": np.zeros((1, 3)), "move": lambda *a: None, "likelihood": lambda *a: np.zeros(3), "measure": lambda *a: np.zeros(3), "mean": lambda x, dt: x,
+        "deviation": lambda x, dt: 1.0, "coordinate": 0, "anchors": ANCHORS, "places": [[0.0, 0.0], [5.0, 0.0]], "place": (0.0, 0.0), "source": [0.0, 0.0],
+        "table": pl.DataFrame({"t": [0.0, 1.0], "a": [1.0, 2.0]}), "columns": {"a": [1.0]}, "seed": 1, "array": np.zeros(3), "other": fb.Model.walk(0.1),
+    }  # fmt: skip
+    if name == "FusionCentre.step":
+        right["samples"] = {"a": 1.0}
+    if name == "RangeTracker.run":
+        right["time"] = "t"
+    if name == "Generator.add_normal":
+        right["deviation"] = 1.0
+    if name == "plot":
+        pytest.skip("its arguments are matplotlib's")
+    for wrong in [*positional, *named]:
+        if wrong in FREE:
+            continue
+        values = [Nothing() if key == wrong else right.get(key, "t") for key in positional]
+        with pytest.raises(fb.ArgumentError) as caught:
+            function(*values, **{**NEEDED.get(name, {}), **({wrong: Nothing()} if wrong in named else {})})
+        # Of these two one is given.
+        either = {"deviation"} if wrong == "covariance" else set()
+        assert caught.value.name in {wrong} | either, (wrong, caught.value)
+        assert "Nothing" in caught.value.value or caught.value.name in either, (wrong, caught.value)
+
+
+def test_numbers_out_of_range_and_of_other_types_are_named():
+    for call, name, value in [
+        (lambda: fb.Model.walk("much"), "density", "'much'"),
+        (lambda: fb.Generator(-1), "seed", "-1"),
+        (lambda: fb.Generator(2**64), "seed", "18446744073709551616"),
+        (lambda: fb.Generator(1.5), "seed", "1.5"),
+        (lambda: fb.resample([1.0], seed=1, count=-2), "count", "-2"),
+        (lambda: fb.design(prior=(0, 1), noise=[1.0], bits=[-1]), "bits", "[-1]"),
+        (lambda: fb.SourceSearch([[0.0, 0.0]], reach=1, instants=[1.0], noise=1, diffusivity=1, rate=1, box=((0, 0), (1,))), "box", "((0, 0), (1,))"),
+        (lambda: fb.OneBit(a=0.9, process=1, noise=1).step(2**40, mean=0, variance=1), "bit", str(2**40)),
+        (lambda: fb.FusionCentre("model", mean=0, deviation=1), "model", "'model'"),
+        (lambda: centre().step(0.0, {"a": "high"}), "samples", "{'a': 'high'}"),
+        (lambda: fb.frontier(fb.Model.walk(0.1), sensors="two", noise=1.0, times=[0], mean=0, deviation=1, seed=1), "sensors", "'two'"),
+    ]:
+        with pytest.raises(fb.ArgumentError) as caught:
+            call()
+        error = caught.value
+        assert (error.name, error.value) == (name, value) and error.expected
+        assert str(error).startswith(f"argument `{name}` is {value}: expected ") and isinstance(error, ValueError)
+    # A wrong type is a TypeError too, and what the caller's own conversion raises is handed on.
+    with pytest.raises(TypeError):
+        fb.Model.walk(None)
+
+    class Failing:
+        def __float__(self):
+            raise RuntimeError("mine")
+
+    with pytest.raises(RuntimeError, match="mine"):
+        fb.Model.walk(Failing())

@@ -414,13 +414,41 @@ def test_tables_that_cannot_be_read_are_named(tmp_path):
     refused(column, "to_frame")
     refused(pl.Series("x", [1.0]), "to_frame")
     refused(pl.DataFrame({"x": pl.Series([2**100], dtype=pl.Int128)}), "columns that can be read")
-    # polars hands nulls without a type on as no other library does.
-    for nothing in (pl.DataFrame({"x": [1.0], "y": [None]}), pa.table({"x": [1.0], "y": pa.nulls(1)})):
-        try:
-            fb.write(nothing, tmp_path / "a.fewb")
-            assert np.isnan(fb.read(tmp_path / "a.fewb")["y"]).all()
-        except fb.ArgumentError as error:
-            assert error.name == "column" and "'y' without a type" in error.value
     stamped = pd.DataFrame({"x": [1.0]}, index=pd.date_range("2026-01-01", periods=1))
     refused(stamped, "rename_axis")
     refused(stamped, "rename_axis", time="index")
+
+
+def of_nothing(library):
+    """A column of numbers, one of None without a type, and one with a single number."""
+    columns = {"t": [0.0, 1.0, 2.0], "a": [1.0, None, 2.0], "b": [None, None, None], "c": [None, 3.0, None]}
+    if library == "polars":
+        frame = pl.DataFrame(columns)
+        assert frame.schema["b"] == pl.Null
+    elif library == "pyarrow":
+        frame = pa.table(columns)
+        assert frame.schema.field("b").type == pa.null()
+    else:
+        frame = pd.DataFrame(columns, dtype=object).astype({"t": float, "a": float, "c": float})
+        assert frame["b"].dtype == object
+    return frame
+
+
+@pytest.mark.parametrize("library", ["polars", "pyarrow", "pandas"])
+def test_columns_of_nulls_without_a_type_are_gaps(library, tmp_path):
+    # What these libraries make of a column of None: a sensor that has said nothing yet.
+    frame = of_nothing(library)
+    fb.write(frame, tmp_path / "a.fewb", time="t", bounds="±0.01")
+    back = fb.read(tmp_path / "a.fewb")
+    assert np.isnan(back["b"]).all() and np.isnan(back["a"]).tolist() == [False, True, False]
+    assert fb.verify(frame, tmp_path / "a.fewb", time="t")["holds"]
+    assert len(fb.plan(frame, time="t")) > 0
+    results = []
+    for sensors in ("abc", "ac"):
+        centre = fb.FusionCentre(fb.Model.walk(0.1), mean=0.0, deviation=3.0)
+        for name in sensors:
+            centre.join(name, noise=0.5)
+        results.append(centre.run(frame, time="t")["x0"])
+    assert np.array_equal(*results)
+    grid = fb.GridFilter(lambda x, dt: x, lambda x, dt: 1.0, {"b": lambda x, z: -np.abs(x - z)}, lower=-9, upper=9, spacing=0.5, start=(0, 1))
+    assert (grid.run(frame, time="t")["log_likelihood"] == 0).all()

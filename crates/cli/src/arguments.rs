@@ -199,8 +199,9 @@ pub(crate) struct ReceiveOptions {
     /// With `--format lorawan`: only this device, by its EUI or name.
     #[arg(long, value_name = "DEVICE", requires = "format")]
     pub(crate) device: Option<String>,
-    /// Frames are those of one sensor with the adaptive encoder of `fewbits-node`, within this bound: `±0.05`, on a circle `±2@360`. Rows
-    /// are slots and values. From a loss that is noticed to the next refresh there are gaps.
+    /// Frames are those of one sensor that reports by the clock. With a bound, `±0.05`, on a circle `±2@360`, it runs the adaptive encoder of
+    /// `fewbits-node`: rows are slots and values; from a loss that is noticed to the next refresh there are gaps. With `bit`, `word:1` to
+    /// `word:32` or `value` rows are slots and what was sent; silent slots are gaps.
     #[arg(long, value_name = "BOUND", conflicts_with = "udp", allow_hyphen_values = true)]
     pub(crate) sensor: Option<String>,
     /// With `--sensor`: bits of the sequence number in each packet.

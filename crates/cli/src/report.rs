@@ -11,6 +11,10 @@ use nalgebra::SVector;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 
+/// Where in a meaning the kind stands, and the bits of a word.
+const KIND_AT: u32 = 28;
+const WORD_AT: u32 = 24;
+
 /// Kind of a sensor's reports: `bit`, `word:3`, `value` or `silent:1.5`, or as a table `{ kind = "word", bits = 3 }`. The files of sensor
 /// and centre must state the same.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -91,6 +95,52 @@ impl Report {
             Self::Value => ReportLength::Fixed(64),
             Self::Censored { .. } => ReportLength::Varying,
         }
+    }
+
+    /// What both ends must agree about, as a number: the kind, and what the words and the silence of a sensor depend on besides. `place` is
+    /// the number of coordinates of the state, and which one the sensor reads.
+    pub(crate) fn meaning(self, deviation: f64, place: (usize, usize)) -> u32 {
+        let numbers = |numbers: &[u64], bits: u32| {
+            let bytes = numbers.iter().flat_map(|number| number.to_be_bytes());
+            let hash = bytes.fold(0x811c_9dc5_u32, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193));
+            (hash ^ hash >> bits) & ((1 << bits) - 1)
+        };
+        match self {
+            Self::Sign => 1 << KIND_AT,
+            Self::Word { bits } => 2 << KIND_AT | (bits & 15) << WORD_AT | numbers(&[deviation.to_bits()], WORD_AT),
+            Self::Value => 3 << KIND_AT,
+            Self::Censored { threshold } => {
+                let (coordinates, reads) = place;
+                let all = [
+                    threshold.to_bits(),
+                    deviation.to_bits(),
+                    coordinates as u64,
+                    reads as u64,
+                ];
+                4 << KIND_AT | numbers(&all, KIND_AT)
+            }
+        }
+    }
+
+    /// What the other end was told, from its [`meaning`](Self::meaning); nothing if the number is none.
+    pub(crate) fn named(self, found: u32) -> Option<String> {
+        let rest = found & ((1 << KIND_AT) - 1);
+        let word = match found >> KIND_AT {
+            1 if rest == 0 => "bit".to_owned(),
+            2 if (2..=4).contains(&(rest >> WORD_AT)) => format!("word:{}", rest >> WORD_AT),
+            3 if rest == 0 => "value".to_owned(),
+            4 => "silent".to_owned(),
+            _ => return None,
+        };
+        let own = self.word();
+        let differs = match self {
+            Self::Word { .. } if own == word => " with another `deviation`",
+            Self::Censored { .. } if word == "silent" => {
+                " with another threshold, `deviation`, `coordinates` or `reads`"
+            }
+            _ => "",
+        };
+        Some(format!("`{word}`{differs}"))
     }
 
     /// Whether the sensor is told the covariance of the state.

@@ -101,6 +101,7 @@ pub(crate) fn run(options: &SensorOptions) -> Result<Ending, Error> {
     } = read(file)?;
     let mut settings = SensorSettings::new(Feedback::Told);
     settings.heartbeat_after = given.heartbeat_after;
+    settings.meaning = given.report.meaning(given.deviation, (given.coordinates, given.reads));
     if given.state.is_none() {
         say!(
             "note: no `state`: when this sensor starts again, its centre refuses it until it has a new key, and it accepts old \
@@ -116,6 +117,7 @@ pub(crate) fn run(options: &SensorOptions) -> Result<Ending, Error> {
         lines: lines(),
         node,
         stream: Stream::new(given.seed).indexed(u64::from(given.number)),
+        report: given.report,
         refused: None,
         bad: 0,
         centre: crate::place::shown(&given.centre),
@@ -193,6 +195,7 @@ struct Samples {
     lines: Receiver<(u64, std::io::Result<String>)>,
     node: Node,
     stream: Stream,
+    report: Report,
     refused: Option<Error>,
     /// Number of lines that were no numbers.
     bad: u64,
@@ -249,7 +252,16 @@ impl Program for Samples {
     }
 
     fn note(&mut self, note: Note) {
-        let text = note.to_string();
+        let text = match note {
+            Note::OtherMeaning { found, .. } => {
+                let (own, other) = (self.report.word(), self.report.named(found));
+                format!(
+                    "the centre expects {}, here it is `{own}`, so no report is used; `report` must be the same here and at the centre",
+                    other.unwrap_or_else(|| "another `report`".to_owned())
+                )
+            }
+            note => note.to_string(),
+        };
         let kind = text.split(',').next().unwrap_or_default().to_owned();
         self.notes.say(&kind, &text);
     }

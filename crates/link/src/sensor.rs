@@ -131,8 +131,7 @@ impl SensorLink {
     /// # Errors
     /// If the store cannot be written.
     pub fn hello(&mut self) -> Result<Request, Error> {
-        let slot = self.sensor.answered().unwrap_or_default();
-        self.seal(Frame::new(Kind::Heartbeat, slot, 0, Payload::EMPTY))
+        self.seal(self.sensor.hello())
     }
 
     /// The time is `now`, in nanoseconds. Timers that are due fire.

@@ -156,7 +156,7 @@ impl<'a> Frame<'a> {
         // Three bits: always one of the eight.
         bytes
             .first()
-            .map(|first| Kind::ALL[usize::from(first >> KIND_SHIFT & 7)])
+            .and_then(|first| Kind::ALL.get(usize::from(first >> KIND_SHIFT & 7)).copied())
     }
 
     /// Reads a frame that takes all of `bytes`. Any bytes give a frame or an error.
@@ -173,28 +173,37 @@ impl<'a> Frame<'a> {
         }
         let padding = usize::from(first & 7);
         let too_short = DecodeError::TooShort { found: bytes.len() };
-        let end = bytes.len().checked_sub(CHECK_BYTES).ok_or(too_short)?;
-        let header = kind.header();
-        let content = bytes.get(header..end).ok_or(too_short)?;
+        // Without indexing: the optimiser can then remove every panic.
+        let (content, sum) = bytes.split_last_chunk::<CHECK_BYTES>().ok_or(too_short)?;
+        let (fields, rest) = content.split_first_chunk::<HEADER_BYTES>().ok_or(too_short)?;
+        let (destination, payload) = match kind {
+            Kind::Handover => rest
+                .split_first_chunk::<DESTINATION_BYTES>()
+                .map(|(destination, payload)| (u32::from_be_bytes(*destination), payload))
+                .ok_or(too_short)?,
+            _ => (0, rest),
+        };
         // If the check covers the header only, inverted bits of the payload reach the estimator, which knows their probability.
         let covered = match check {
-            Check::Whole => end,
-            Check::Header => header,
+            Check::Whole => content,
+            Check::Header => content.get(..kind.header()).ok_or(too_short)?,
         };
-        if SUM.checksum(&bytes[..covered]).to_be_bytes() != bytes[end..] {
+        if SUM.checksum(covered).to_be_bytes() != *sum {
             return Err(DecodeError::Check);
         }
         // The payload ends `padding` bits before its last byte does.
-        let bits = (8 * content.len()).checked_sub(padding).ok_or(DecodeError::Padding)?;
+        let bits = payload
+            .len()
+            .checked_mul(8)
+            .and_then(|bits| bits.checked_sub(padding))
+            .ok_or(DecodeError::Padding)?;
+        let [_, s0, s1, s2, d0, d1, d2, d3] = *fields;
         Ok(Self {
             kind,
-            slot: Slot::of_count(u64::from(u32::from_be_bytes([0, bytes[1], bytes[2], bytes[3]]))),
-            digest: u32::from_be_bytes([bytes[4], bytes[5], bytes[6], bytes[7]]),
-            destination: match kind {
-                Kind::Handover => u32::from_be_bytes([bytes[8], bytes[9], bytes[10], bytes[11]]),
-                _ => 0,
-            },
-            payload: Payload::new(content, bits).ok_or(DecodeError::Padding)?,
+            slot: Slot::of_count(u64::from(u32::from_be_bytes([0, s0, s1, s2]))),
+            digest: u32::from_be_bytes([d0, d1, d2, d3]),
+            destination,
+            payload: Payload::new(payload, bits).ok_or(DecodeError::Padding)?,
         })
     }
 }

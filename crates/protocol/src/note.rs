@@ -42,6 +42,14 @@ pub enum Note {
         /// Slot of the frame.
         slot: Slot,
     },
+    /// The other end was told that reports mean something else: see [`SensorSettings::meaning`](crate::SensorSettings::meaning). At a centre
+    /// it may also be an answer to other feedback.
+    OtherMeaning {
+        /// Slot of the frame.
+        slot: Slot,
+        /// What the other end was told.
+        found: u32,
+    },
     /// A follower replaced its state by the one that was sent to it.
     Resynchronised {
         /// First slot with the new state.
@@ -87,6 +95,9 @@ impl fmt::Display for Note {
             Self::Duplicate { slot } => write!(f, "frame came a second time, slot {}", slot.number()),
             Self::Late { slot } => write!(f, "late frame, slot {}", slot.number()),
             Self::Disagreement { slot } => write!(f, "disagreement, slot {}", slot.number()),
+            Self::OtherMeaning { slot, .. } => {
+                write!(f, "reports mean something else at the other end, slot {}", slot.number())
+            }
             Self::Resynchronised { slot } => write!(f, "resynchronised, slot {}", slot.number()),
             Self::Unacknowledged { slot } => write!(f, "report not acknowledged, slot {}", slot.number()),
             Self::Retained { slot } => write!(f, "handover given up, slot {}", slot.number()),

@@ -39,6 +39,10 @@ pub struct SensorSettings {
     pub repeats: u8,
     /// Nanoseconds that the sensor waits for an acknowledgement before it repeats a report.
     pub patience: u64,
+    /// What the bits of its reports mean: a number that both ends make of what they were told, such as the scheme; 0: not said. It is part
+    /// of the digest of every answer, so a centre that was told otherwise does not use the reports, and both ends note it.
+    #[cfg_attr(feature = "std", serde(default))]
+    pub meaning: u32,
 }
 
 impl SensorSettings {
@@ -52,6 +56,7 @@ impl SensorSettings {
             heartbeat_after: 0,
             repeats: 0,
             patience: 0,
+            meaning: 0,
         }
     }
 }
@@ -207,7 +212,7 @@ impl Sensor {
             (_, Kind::Acknowledgement) => return self.on_ack(slot),
             (Feedback::Told, Kind::Feedback) | (Feedback::Echoed, Kind::Echo | Kind::Snapshot) => true,
             (Feedback::Clock, Kind::Feedback | Kind::Echo | Kind::Snapshot | Kind::Heartbeat) => false,
-            (_, Kind::Heartbeat) => return Reaction::NOTHING,
+            (_, Kind::Heartbeat) => return self.on_meaning(slot, frame.digest),
             (_, kind) => return noted(Note::Unexpected { kind }),
         };
         if !is_broadcast {
@@ -231,6 +236,25 @@ impl Sensor {
             return noted(Note::Disagreement { slot });
         }
         self.sample(slot, frame.digest, frame.payload)
+    }
+
+    /// The centre says what it takes reports for.
+    fn on_meaning(&self, slot: Slot, found: u32) -> Reaction<'static> {
+        let own = self.settings.meaning;
+        match found {
+            found if found == 0 || own == 0 || found == own => Reaction::NOTHING,
+            found => noted(Note::OtherMeaning { slot, found }),
+        }
+    }
+
+    /// The frame by which a sensor that was not asked says that it is there, and what its reports mean.
+    pub fn hello(&self) -> Frame<'static> {
+        let slot = match self.settings.meaning {
+            0 => self.answered.unwrap_or_default(),
+            // By slot 0 it differs from a late answer.
+            _ => Slot::default(),
+        };
+        Frame::new(Kind::Heartbeat, slot, self.settings.meaning, Payload::EMPTY)
     }
 
     fn sample<'a>(&mut self, slot: Slot, digest: u32, feedback: Payload<'a>) -> Reaction<'a> {
@@ -295,6 +319,7 @@ impl Sensor {
         let Stage::Sampling { slot, digest } = self.stage else {
             return noted(Note::Misuse);
         };
+        let digest = digest ^ self.settings.meaning;
         self.stage = Stage::Idle;
         // After many silent slots send a heartbeat: it tells the centre that the sensor works.
         let Some(report) = report else {

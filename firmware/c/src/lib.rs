@@ -9,6 +9,7 @@ use fewbits_node::{
     Error, Sample, cell_of, censor, innovation_cell, innovation_cell_of_codes, range_level, range_level_of_codes,
     sign_bit, trigger,
 };
+use fewbits_protocol::{Check, Frame, Kind, Payload, Slot, digest};
 
 unsafe extern "C" {
     /// Defined nowhere: a program in which a panic can be reached does not link.
@@ -284,4 +285,88 @@ pub unsafe extern "C" fn fewbits_encoder_reconstruction(encoder: *const Encoder)
     unsafe { encoder.as_ref() }
         .and_then(Encoder::reconstruction)
         .unwrap_or(f64::NAN)
+}
+
+/// # Safety
+/// `start` is null, with `bits` 0, or points to the bytes of `bits` bits.
+unsafe fn payload<'a>(start: *const u8, bits: usize) -> Option<Payload<'a>> {
+    if bits == 0 {
+        return Some(Payload::EMPTY);
+    }
+    // SAFETY: the caller's promise.
+    Payload::new(unsafe { numbers(start, bits.div_ceil(8)) }?, bits)
+}
+
+/// # Safety
+/// As [`payload`]; `sum` is null or points to a number.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fewbits_frame_digest(slot: u32, start: *const u8, bits: usize, sum: *mut u32) -> i32 {
+    // SAFETY: the caller's promise.
+    let (Some(payload), Some(sum)) = (unsafe { (payload(start, bits), sum.as_mut()) }) else {
+        return REFUSED;
+    };
+    *sum = digest(Slot::of_count(u64::from(slot)), payload);
+    0
+}
+
+/// `fewbits_frame`.
+#[repr(C)]
+pub struct CFrame {
+    kind: u32,
+    slot: u32,
+    digest: u32,
+    payload: *const u8,
+    bits: usize,
+}
+
+/// # Safety
+/// `frame` is null or points to a frame whose payload is as for [`payload`], `bytes` is null or points to `room` bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fewbits_frame_write(frame: *const CFrame, bytes: *mut u8, room: usize) -> i32 {
+    // SAFETY: the caller's promise.
+    let Some(frame) = (unsafe { frame.as_ref() }) else {
+        return REFUSED;
+    };
+    let kind = match frame.kind {
+        0 => Kind::Feedback,
+        1 => Kind::Report,
+        4 => Kind::Request,
+        6 => Kind::Heartbeat,
+        7 => Kind::Acknowledgement,
+        _ => return REFUSED,
+    };
+    // SAFETY: the caller's promise.
+    let Some(payload) = (unsafe { payload(frame.payload, frame.bits) }) else {
+        return REFUSED;
+    };
+    if bytes.is_null() || room > 1 << 16 {
+        return REFUSED;
+    }
+    // SAFETY: the caller's promise.
+    let buffer = unsafe { slice::from_raw_parts_mut(bytes, room) };
+    let frame = Frame::new(kind, Slot::of_count(u64::from(frame.slot)), frame.digest, payload);
+    frame
+        .encode(Check::Whole, buffer)
+        .map_or(REFUSED, |written| written.len() as i32)
+}
+
+/// # Safety
+/// `bytes` is null or points to `count` bytes, `frame` is null or points to a frame.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fewbits_frame_read(bytes: *const u8, count: usize, frame: *mut CFrame) -> i32 {
+    // SAFETY: the caller's promise.
+    let (Some(bytes), Some(frame)) = (unsafe { (numbers(bytes, count), frame.as_mut()) }) else {
+        return REFUSED;
+    };
+    let Ok(found) = Frame::decode(bytes, Check::Whole) else {
+        return REFUSED;
+    };
+    *frame = CFrame {
+        kind: found.kind as u32,
+        slot: found.slot.number(),
+        digest: found.digest,
+        payload: found.payload.bytes().as_ptr(),
+        bits: found.payload.bits(),
+    };
+    0
 }

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from ._fewbits import FusionCentre, Generator, Model, Table
-from .errors import ArgumentError
+from .errors import ArgumentError, ArgumentTypeError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -49,6 +49,13 @@ def frontier(
     >>> bool(front["rmse"][1] < front["rmse"][0]), front["pareto"].tolist()
     (True, [True, True, False])
     """
+    for name, count in (("sensors", sensors), ("trials", trials), ("reads", reads)):
+        if not hasattr(count, "__index__"):
+            raise ArgumentTypeError(name, repr(count), "a whole number")
+    if not hasattr(noise, "__float__"):
+        raise ArgumentTypeError("noise", repr(noise), "a number")
+    if not isinstance(model, Model):
+        raise ArgumentTypeError("model", repr(model), "a Model")
     for name, count in (("sensors", sensors), ("trials", trials)):
         if count < 1:
             raise ArgumentError(name, str(count), "1 or more")

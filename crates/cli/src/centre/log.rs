@@ -3,6 +3,7 @@
 use crate::Ending;
 use crate::error::Error;
 use crate::notes::{Limiter, MOST_NAMED};
+use crate::report::Report;
 use crate::say::say;
 use fewbits_core::Observation;
 use fewbits_link::{Counts, Output, Station};
@@ -18,6 +19,7 @@ const SILENT_SLOTS: u64 = 10;
 
 pub(super) struct Log {
     numbers: Vec<u32>,
+    kinds: Vec<Report>,
     period: f64,
     notes: Limiter,
     /// Counts at the last report of refused frames: of all, and of each sensor.
@@ -45,10 +47,11 @@ fn refused(mut of: Vec<(u32, u64)>, what: &str) {
 }
 
 impl Log {
-    pub(super) fn new(numbers: Vec<u32>, period: f64) -> Self {
+    pub(super) fn new(numbers: Vec<u32>, kinds: Vec<Report>, period: f64) -> Self {
         Self {
             of_sensors: vec![Counts::default(); numbers.len()],
             numbers,
+            kinds,
             period,
             notes: Limiter::default(),
             all: Counts::default(),
@@ -124,6 +127,21 @@ impl Log {
                     "sensor {number}: a report of another length, slot {slot}: `report` must be the same in its file and here"
                 );
                 self.notes.say_of("reports of another length", number, &text);
+            }
+            Output::Note {
+                sensor,
+                note: Note::OtherMeaning { slot, found },
+            } => {
+                let (number, slot) = (self.number(*sensor), slot.number());
+                let own = self.kinds.get(*sensor);
+                let text = match own.and_then(|own| Some((own.word(), own.named(*found)?))) {
+                    Some((own, other)) => format!(
+                        "sensor {number}: it sends {other}, here it is `{own}`, so its reports are not used; `report` must be the same in \
+                         its file and here"
+                    ),
+                    None => format!("sensor {number}: an answer to another question, slot {slot}"),
+                };
+                self.notes.say_of("another `report` than here", number, &text);
             }
             Output::Note { sensor, note } => {
                 let (number, text) = (self.number(*sensor), note.to_string());

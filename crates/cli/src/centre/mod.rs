@@ -159,7 +159,9 @@ fn with<const D: usize, T: Transport>(
         report: sensor.report.length(),
     };
     let members = given.sensors.iter().map(member).collect();
-    let settings = CentreSettings::new(members, Schedule::new(period));
+    let mut settings = CentreSettings::new(members, Schedule::new(period));
+    let meaning = |sensor: &Sensor| sensor.report.meaning(sensor.deviation, (D, sensor.reads));
+    settings.meanings = given.sensors.iter().map(meaning).collect();
     let store = given.state.clone().map(|path| match given.durable {
         true => Store::new(path).durable(),
         false => Store::new(path),
@@ -191,7 +193,8 @@ fn serve<R: Receiver, T: Transport>(
 ) -> Result<Ending, Error> {
     let numbers: Vec<u32> = given.sensors.iter().map(|sensor| sensor.number).collect();
     let mut rows = Rows::new(options.format(), coordinates, given.period, numbers.clone());
-    let mut log = Log::new(numbers.clone(), given.period);
+    let reports = given.sensors.iter().map(|sensor| sensor.report).collect();
+    let mut log = Log::new(numbers.clone(), reports, given.period);
     rows.head()?;
     // The last step may not have been written before the process was stopped.
     if let Some(step) = station.last_step() {

@@ -69,7 +69,11 @@ impl Rows {
             RowFormat::Csv => self.csv(step, more),
             RowFormat::Json => self.json(step, more),
             RowFormat::Influx => {
-                let end = ((step.slot + 1) as f64 * self.period * 1e9) as u64;
+                // In whole nanoseconds, as the schedule counts: a double would be up to 128 of them off.
+                let end = step
+                    .slot
+                    .saturating_add(1)
+                    .saturating_mul((self.period * 1e9).round() as u64);
                 influx_line("fewbits", step, &self.events(step), more, end)
             }
             RowFormat::Senml => senml::to_json(&self.senml(step))?,

@@ -21,7 +21,7 @@ pub(crate) fn run(options: &ReceiveOptions, format: Format) -> Result<Ending, Er
     let (mut messages, name) = source(options, format)?;
     let sensor = options.sensor.as_deref();
     let sensor = sensor
-        .map(|bound| node::config(bound, options.sequence_bits))
+        .map(|bound| node::coding(bound, options.sequence_bits))
         .transpose()?;
     let is_of = |device: &str| {
         options

@@ -22,7 +22,7 @@ pub(crate) fn run(options: &ReceiveOptions) -> Result<Ending, Error> {
     }
     let sensor = options.sensor.as_deref();
     let sensor = sensor
-        .map(|bound| node::config(bound, options.sequence_bits))
+        .map(|bound| node::coding(bound, options.sequence_bits))
         .transpose()?;
     match (&options.udp, &options.serial, sensor) {
         (Some(address), ..) => receive_datagrams(options, address),

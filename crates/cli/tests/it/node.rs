@@ -100,3 +100,52 @@ fn stream_without_a_whole_frame_is_an_error() {
         assert!(text(&refused.stderr).contains("standard input: no whole frame"), "{}", text(&refused.stderr));
     }
 }
+
+/// A sensor that reports by the clock with words of a quantizer, bits or values: a row a slot, gaps where it was silent.
+#[test]
+fn words_and_values_are_rows_too() {
+    let period = NonZeroU64::new(1_000_000).unwrap();
+    let stream = |report: &dyn Fn(u64) -> Option<(Vec<u8>, usize)>| {
+        let mut settings = SensorSettings::new(Feedback::Clock);
+        settings.schedule = Some(Schedule::new(period));
+        let (mut sensor, mut line) = (Sensor::new(settings), Vec::new());
+        for slot in 0..20 {
+            let now = slot * period.get();
+            sensor.on_timer(now, SensorTimer::SlotBegins);
+            let bits = report(slot);
+            let payload = bits.as_ref().map(|(bytes, bits)| Payload::new(bytes, *bits).unwrap());
+            if let Task::Send(frame) = sensor.on_sample(now, payload).task {
+                line.extend(cobs::encode_vec(frame.encode(Check::Whole, &mut [0; 64]).unwrap()));
+                line.push(0);
+            }
+        }
+        line
+    };
+    let speaks = |slot: u64| slot % 5 != 3 || slot == 19;
+    let word = |slot: u64| speaks(slot).then(|| (vec![((slot * 3 % 8) as u8) << 5], 3));
+    let bit = |slot: u64| speaks(slot).then(|| (vec![((slot % 2) as u8) << 7], 1));
+    let wide = |slot: u64| speaks(slot).then(|| (((slot as u32) << 20 | 7).to_be_bytes().to_vec(), 32));
+    let value = |slot: u64| speaks(slot).then(|| ((0.1 * slot as f64).to_be_bytes().to_vec(), 64));
+    let (_kept, folder) = folder();
+    let rows = |option: &str, stream: &[u8]| -> Vec<(u64, Option<f64>)> {
+        let table = text(&good(&folder, &["receive", "--sensor", option], stream));
+        let rows = table.lines().skip(1).map(|line| line.split_once(',').unwrap());
+        rows.map(|(slot, value)| (slot.parse().unwrap(), value.parse().ok()))
+            .collect()
+    };
+    let expected = |of: &dyn Fn(u64) -> f64| -> Vec<(u64, Option<f64>)> {
+        (0..20).map(|slot| (slot, speaks(slot).then(|| of(slot)))).collect()
+    };
+    assert_eq!(rows("word:3", &stream(&word)), expected(&|slot| (slot * 3 % 8) as f64));
+    assert_eq!(rows("bit", &stream(&bit)), expected(&|slot| (slot % 2) as f64));
+    assert_eq!(rows("word:32", &stream(&wide)), expected(&|slot| ((slot << 20) + 7) as f64));
+    assert_eq!(rows("value", &stream(&value)), expected(&|slot| 0.1 * slot as f64));
+    // Another length than was said is a gap, and named; what is no scheme is refused.
+    let output = super::fewbits(&folder, &["receive", "--sensor", "word:4"], &stream(&word));
+    assert!(text(&output.stdout).lines().skip(1).all(|line| line.ends_with(',')));
+    assert!(text(&output.stderr).contains("it has 3 bits, `--sensor` says 4"));
+    for wrong in ["word:0", "word:33", "word:x", "words"] {
+        let output = super::fewbits(&folder, &["receive", "--sensor", wrong], &[]);
+        assert!(!output.status.success() && text(&output.stderr).contains("word:32"), "{wrong}");
+    }
+}

@@ -41,19 +41,22 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
         outputs.push(Output::Passed { slot, reason });
     }
 
-    /// Answers a heartbeat that answers no question, so that its sensor knows that it is heard although it may be asked much later. Sensors
-    /// that report by the clock would set it by the answer and get none.
+    /// Answers a heartbeat that answers no question, so that its sensor knows that it is heard although it may be asked much later, and a
+    /// frame of a sensor whose reports mean something else than the centre was told. The answer says what the centre was told. Sensors that
+    /// report by the clock would set it by the answer and get none.
     pub(super) fn answer_hello(&mut self, place: usize, frame: &[u8], answers: bool, outputs: &mut Vec<Output<A>>) {
         let settings = self.centre.settings();
-        let is_hello =
-            !answers && Frame::decode(frame, settings.check).is_ok_and(|frame| frame.kind == Kind::Heartbeat);
+        let kind = Frame::decode(frame, settings.check).ok().map(|frame| frame.kind);
+        let is_hello = !answers && kind == Some(Kind::Heartbeat);
+        let is_unlike = self.centre.is_unlike(place) && matches!(kind, Some(Kind::Report | Kind::Heartbeat));
         let is_told = settings
             .members
             .get(place)
             .is_some_and(|member| member.feedback == Feedback::Told);
         let is_free = self.remotes.get(place).is_some_and(|remote| remote.sent < MOST_ANSWERS);
-        if is_hello && is_told && is_free && self.has_begun {
-            let answer = Frame::new(Kind::Heartbeat, Slot::of_count(self.centre.slot()), 0, Payload::EMPTY);
+        if (is_hello || is_unlike) && is_told && is_free && self.has_begun {
+            let (slot, meaning) = (Slot::of_count(self.centre.slot()), settings.meaning(place));
+            let answer = Frame::new(Kind::Heartbeat, slot, meaning, Payload::EMPTY);
             let bytes = answer.to_bytes(settings.check);
             self.send(place, &bytes, outputs);
         }

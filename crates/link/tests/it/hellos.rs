@@ -6,7 +6,7 @@ use fewbits_link::{
     Direction, Output, Program, Request, SensorLink, Start, Station, Store, Udp, run_sensor, run_station,
 };
 use fewbits_monte_carlo::Stream;
-use fewbits_protocol::{Feedback, Receiver, SensorSettings, Slot};
+use fewbits_protocol::{Feedback, Note, Receiver, SensorSettings, Slot};
 use std::collections::HashSet;
 use std::net::SocketAddr;
 use std::ops::ControlFlow;
@@ -204,5 +204,96 @@ fn a_sensor_that_was_told_another_address_of_its_centre_is_asked() {
     match std::net::UdpSocket::bind("[::1]:0") {
         Ok(_) => assert!(reports_from("[::]", "[::1]") && reports_from("[::]", "127.0.0.3")),
         Err(_) => println!("skipped: this machine has no IPv6"),
+    }
+}
+
+/// Files that say different schemes: both ends learn it from the first frame, however silent the sensor is, and again with each report. The
+/// reports are of the right length, so nothing else would tell.
+#[test]
+fn both_ends_are_told_of_another_meaning() {
+    let other = |output: &Output| match output {
+        Output::Note {
+            sensor: 3,
+            note: Note::OtherMeaning { found, .. },
+        } => Some(*found),
+        _ => None,
+    };
+    for (here, there) in [(0, 0), (5, 5), (5, 0), (0, 6), (5, 6)] {
+        let mut settings = settings(Reports::Signs, HOUR, 10);
+        settings.meanings = vec![here; 10];
+        let mut centre = Station::new(settings, receiver(Reports::Signs, 0.05), peers(10), None).unwrap();
+        let mut own = SensorSettings::new(Feedback::Told);
+        own.meaning = there;
+        let mut link = SensorLink::new(own, 3, key(3), None).unwrap();
+        let (address, mut sensor) = (SocketAddr::from(([127, 0, 0, 1], 3)), node(Reports::Signs));
+        let (mut at_centre, mut at_sensor, mut used) = (0, 0, 0);
+        let mut up = vec![hello(&mut link)];
+        for slot in 1..=4 {
+            let mut outputs = Vec::new();
+            centre.on_time(slot * HOUR, &mut outputs).unwrap();
+            for bytes in std::mem::take(&mut up) {
+                centre.on_datagram(address, &bytes, &mut outputs).unwrap();
+            }
+            used += outputs
+                .iter()
+                .filter(|output| matches!(output, Output::Step(step) if step.reports() > 0))
+                .count();
+            for output in outputs {
+                at_centre += other(&output).map_or(0, |found| {
+                    assert_eq!(found, there);
+                    1
+                });
+                let Output::Datagram { bytes, .. } = output else {
+                    continue;
+                };
+                let mut requests = Vec::new();
+                link.on_datagram(0, &bytes, &mut requests).unwrap();
+                for request in std::mem::take(&mut requests) {
+                    match request {
+                        Request::Sample { feedback, .. } => {
+                            let mut rng = Stream::new(slot).rng();
+                            let report = sensor
+                                .report(&mut rng, &measurement(3, slot as u32), &feedback)
+                                .unwrap();
+                            link.on_sample(0, report.as_ref(), &mut requests).unwrap();
+                        }
+                        Request::Note(Note::OtherMeaning { found, .. }) => {
+                            assert_eq!(found, here);
+                            at_sensor += 1;
+                        }
+                        _ => {}
+                    }
+                }
+                up.extend(requests.into_iter().filter_map(|request| match request {
+                    Request::Datagram(bytes) => Some(bytes),
+                    _ => None,
+                }));
+                // A report belongs to the slot in which it was asked for.
+                let mut answers = Vec::new();
+                for bytes in std::mem::take(&mut up) {
+                    centre.on_datagram(address, &bytes, &mut answers).unwrap();
+                }
+                for answer in answers {
+                    at_centre += usize::from(other(&answer).is_some());
+                    if let Output::Datagram { bytes, .. } = answer {
+                        let mut notes = Vec::new();
+                        link.on_datagram(0, &bytes, &mut notes).unwrap();
+                        at_sensor += usize::from(
+                            notes
+                                .iter()
+                                .any(|note| matches!(note, Request::Note(Note::OtherMeaning { .. }))),
+                        );
+                    }
+                }
+            }
+        }
+        let differ = here != 0 && there != 0 && here != there;
+        // A centre that was told nothing takes it for an answer to another question.
+        let is_used = here == there || there == 0;
+        assert_eq!(
+            (at_centre > 1, at_sensor > 1, used > 0),
+            (differ, differ, is_used),
+            "{here} {there}: {at_centre} {at_sensor} {used}"
+        );
     }
 }

@@ -154,6 +154,18 @@ impl StandardNormals {
         }
     }
 
+    /// The state: [`from_state`](Self::from_state) makes a source of it that goes on with the same draws.
+    pub fn state(&self) -> [u64; 2] {
+        [self.words.counter, self.words.step]
+    }
+
+    /// The source of a [`state`](Self::state). `None` if no source has it: its second number is even.
+    pub fn from_state([counter, step]: [u64; 2]) -> Option<Self> {
+        (step & 1 == 1).then_some(Self {
+            words: Words { counter, step },
+        })
+    }
+
     /// Fills `out` with independent `N(0, 1)` draws. They depend only on the seed and on the lengths of this and earlier calls.
     pub fn fill(&mut self, out: &mut [f64]) {
         let table = ziggurat();
@@ -199,6 +211,18 @@ mod tests {
         assert_eq!(block[2..4], [9_817_491_932_198_370_423, 4_593_380_528_125_082_431]);
         assert_eq!(block[4], 16_408_922_859_458_223_821);
         assert_eq!([(); 5].map(|()| words.next()), block);
+    }
+
+    #[test]
+    fn a_stored_source_goes_on() {
+        let mut source = StandardNormals::new(&mut Stuck(0x0123_4567_89ab_cdef));
+        source.fill(&mut [0.0; 1000]);
+        let mut again = StandardNormals::from_state(source.state()).expect("its own state");
+        let (mut a, mut b) = ([0.0; 700], [1.0; 700]);
+        source.fill(&mut a);
+        again.fill(&mut b);
+        assert_eq!(a, b);
+        assert!(StandardNormals::from_state([3, 4]).is_none());
     }
 
     /// A generator stuck at one word.

@@ -297,3 +297,48 @@ fn followers_never_answer_from_another_state() {
     }
     assert!(answers > 12_000 && snapshots > 100, "{answers} answers, {snapshots} snapshots");
 }
+
+/// A sensor that was told another scheme: neither its reports nor its silence are observations, until it says what the centre was told, or
+/// nothing. Late frames and those of a centre that was told nothing change nothing.
+#[test]
+fn reports_that_mean_something_else_are_no_observations() {
+    let mut settings = settings(Feedback::Told, 1);
+    settings.meanings = vec![7];
+    let mut centre = Centre::new(settings);
+    let sum = |slot: u64| digest(Slot::of_count(slot), Payload::from(&bit()));
+    let hello =
+        |meaning: u32| Frame::new(Kind::Heartbeat, Slot::of_count(0), meaning, Payload::EMPTY).to_bytes(Check::Whole);
+    let received = Some(Observation::Received(bit()));
+    // What comes in a slot, what is observed, and what the note has found.
+    let mut slots = 0;
+    let mut expect = |sent: &dyn Fn(u64) -> Vec<Vec<u8>>, seen: Option<Observation<BitString>>, noted: Option<u32>| {
+        slots += 1;
+        begin(&mut centre, slots, &[bit()], None);
+        let mut actions = Vec::new();
+        sent(slots)
+            .iter()
+            .for_each(|bytes| centre.on_frame(0, bytes, &mut actions));
+        let found = actions.iter().find_map(|action| match action {
+            Action::Note {
+                note: Note::OtherMeaning { found, .. },
+                ..
+            } => Some(*found),
+            _ => None,
+        });
+        assert_eq!(found, noted, "slot {slots}");
+        assert_eq!(observed(&mut centre), [seen], "slot {slots}");
+    };
+    expect(&|slot| vec![report(slot, sum(slot))], received.clone(), None);
+    expect(&|slot| vec![report(slot, sum(slot) ^ 7)], received.clone(), None);
+    expect(&|slot| vec![report(slot, sum(slot) ^ 6)], None, Some(6));
+    // Its silence says nothing, whatever comes late.
+    expect(&|_| vec![], None, None);
+    expect(&|slot| vec![report(slot - 1, sum(slot - 1) ^ 7)], None, None);
+    expect(&|slot| vec![report(slot, sum(slot) ^ 7)], received.clone(), None);
+    expect(&|slot| vec![report(slot - 1, sum(slot - 1) ^ 6)], Some(Observation::Nothing), None);
+    expect(&|_| vec![hello(6)], None, Some(6));
+    expect(&|_| vec![hello(0)], None, None);
+    expect(&|_| vec![hello(7)], None, None);
+    expect(&|_| vec![], Some(Observation::Nothing), None);
+    assert!(!centre.is_unlike(0));
+}

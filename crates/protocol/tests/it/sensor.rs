@@ -165,3 +165,36 @@ fn schedules_end_with_the_range_of_times() {
     let reaction = Sensor::new(settings).on_timer(u64::MAX, SensorTimer::SlotBegins);
     assert_eq!(reaction.timer, Some((u64::MAX, SensorTimer::SlotBegins)));
 }
+
+/// What reports mean is part of the digest of every answer and of the frame by which a sensor says that it is there, and the frames are no
+/// longer. A sensor that says nothing of it sends what it always sent.
+#[test]
+fn answers_say_what_they_mean() {
+    let payload = Payload::new(&[7], 8).unwrap();
+    for meaning in [0, 3] {
+        let mut settings = SensorSettings::new(Feedback::Told);
+        (settings.meaning, settings.heartbeat_after) = (meaning, 1);
+        let mut sensor = Sensor::new(settings);
+        let hello = sensor.hello();
+        assert_eq!((hello.slot, hello.digest, hello.kind), (slot(0), meaning, Kind::Heartbeat));
+        sensor.on_frame(0, &told(5, &[7]));
+        let answer = digest(slot(5), payload) ^ meaning;
+        assert_eq!(sent(&sensor.on_sample(0, one())).digest, answer);
+        sensor.on_frame(0, &told(6, &[7]));
+        let silent = sensor.on_sample(0, None);
+        assert_eq!((sent(&silent).digest, sent(&silent).kind), (digest(slot(6), payload) ^ meaning, Kind::Heartbeat));
+        assert_eq!(sensor.hello().slot, if meaning == 0 { slot(6) } else { slot(0) });
+        // What the centre was told: nothing, the same, something else.
+        let notes = [0, 3, 4].map(|found| {
+            let frame = bytes(Frame::new(Kind::Heartbeat, slot(6), found, Payload::EMPTY));
+            let reaction = sensor.on_frame(0, &frame);
+            assert_eq!(reaction.task, Task::Wait);
+            reaction.note
+        });
+        let other = Note::OtherMeaning {
+            slot: slot(6),
+            found: 4,
+        };
+        assert_eq!(notes, [None, None, (meaning == 3).then_some(other)]);
+    }
+}

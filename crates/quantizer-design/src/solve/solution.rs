@@ -1,6 +1,7 @@
 //! A finished design: cells and words of every sensor, the value of the criterion, a bound and a certificate.
 
 use super::participant::{Participant, WordedCells, missing, system_of};
+use super::request::MAX_BITS;
 use crate::bounds;
 use crate::criterion::Criterion;
 use crate::decoder::MmseDecoder;
@@ -12,7 +13,7 @@ use crate::system::System;
 use fewbits_core::Link;
 use fewbits_numerics::error::entries;
 use fewbits_quantizers::quantizer::cell_of;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
 /// The designs that a request found, best first.
@@ -40,7 +41,8 @@ impl Solutions {
 }
 
 /// Cells and words of one sensor.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct SensorDesign {
     /// Number of the sensor in the request.
     pub sensor: usize,
@@ -70,7 +72,7 @@ impl SensorDesign {
 }
 
 /// A bound on the criterion over all designs with these bits and links.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Bound {
     /// In the unit of the criterion: a lower bound on an error, an upper bound on information.
     pub value: f64,
@@ -79,7 +81,7 @@ pub struct Bound {
 }
 
 /// How a bound was obtained.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum BoundKind {
     /// Quadratic Gaussian CEO problem: codes of any length at separate sensors, with the links' capacities as rates.
     Ceo,
@@ -92,7 +94,8 @@ pub enum BoundKind {
 }
 
 /// One design: a complete result of a request.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stored")]
 pub struct Solution {
     system: System,
     sensors: Vec<SensorDesign>,
@@ -108,6 +111,59 @@ pub struct Solution {
     pub certificate: Certificate,
     /// The breakpoints over which the certificate holds.
     pub scope: Scope,
+}
+
+/// The stored form of [`Solution`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    system: System,
+    sensors: Vec<SensorDesign>,
+    criterion: Criterion,
+    value: f64,
+    bound: Option<Bound>,
+    certificate: Certificate,
+    scope: Scope,
+}
+
+impl TryFrom<Stored> for Solution {
+    type Error = Error;
+
+    fn try_from(stored: Stored) -> Result<Self, Error> {
+        let Stored {
+            system,
+            sensors,
+            criterion,
+            value,
+            bound,
+            certificate,
+            scope,
+        } = stored;
+        for sensor in &sensors {
+            let (edges, bits) = (&sensor.breakpoints, sensor.bits);
+            let increasing = edges.iter().all(|x| x.is_finite()) && edges.windows(2).all(|pair| pair[0] < pair[1]);
+            let known = (1..=MAX_BITS).contains(&bits) && sensor.words.iter().all(|word| *word < 1 << bits);
+            if !(increasing && known && sensor.words.len() == edges.len() + 1) {
+                let expected = "increasing breakpoints, and a word of its bits for each cell";
+                return refuse("sensors", format!("cells of sensor {}", sensor.sensor), expected);
+            }
+        }
+        if sensors.is_empty() || system.model().sensors() != sensors.len() {
+            return refuse("sensors", sensors.len(), format!("{}, as in the system", system.model().sensors()));
+        }
+        if !value.is_finite() {
+            return refuse("value", value, "a finite number");
+        }
+        Ok(Self {
+            system,
+            sensors,
+            criterion,
+            value,
+            bound,
+            certificate,
+            scope,
+        })
+    }
 }
 
 impl Solution {

@@ -1,126 +1,18 @@
 //! The fusion centre's state machine.
 
-use crate::echo::{ReportLength, echo};
-use crate::frame::{Check, DecodeError, Frame, Kind, digest};
+mod parts;
+
+pub use parts::{Action, CentreSettings, CentreTimer, Member, Recipient};
+
+use crate::echo::echo;
+use crate::frame::{DecodeError, Frame, Kind, digest};
 use crate::note::Note;
 use crate::payload::Payload;
 use crate::sensor::Feedback;
-use crate::slot::{Schedule, Slot};
+use crate::slot::Slot;
 use fewbits_core::{BitString, Observation};
 use serde::{Deserialize, Serialize};
-
-/// Settings of one sensor at its centre.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Member {
-    /// How the sensor learns what it must know before it measures.
-    pub feedback: Feedback,
-    /// Length of its reports in bits.
-    pub report: ReportLength,
-}
-
-/// Settings of a centre.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[non_exhaustive]
-pub struct CentreSettings {
-    /// One entry per sensor, in the order of their numbers from 0.
-    pub members: Vec<Member>,
-    /// When slots begin. Slots are counted from 1 on.
-    pub schedule: Schedule,
-    /// Nanoseconds from the beginning of a slot to its deadline. Reports that arrive later are not used.
-    pub deadline: u64,
-    /// A slot whose timer fires more nanoseconds after its beginning does not begin: its sensors would have no time to answer, and their
-    /// silence would be taken for an observation. [`CentreSettings::new`] says half the time to the deadline, and a tenth of it if a sensor
-    /// reports by the clock.
-    #[serde(default = "any_time")]
-    pub latest_start: u64,
-    /// What the check of a frame covers.
-    pub check: Check,
-    /// Whether the centre acknowledges reports by frames. Not needed on a link that acknowledges by itself.
-    pub acknowledges: bool,
-    /// If so many slots pass in which nothing else is sent to all sensors, a heartbeat is sent, by which sensors set their clocks. 0:
-    /// never.
-    pub announce_every: u32,
-}
-
-impl CentreSettings {
-    /// Settings with the deadline at nine tenths of a slot, a check of the whole frame, no acknowledgements and no heartbeats.
-    pub fn new(members: Vec<Member>, schedule: Schedule) -> Self {
-        let deadline = schedule.period() / 10 * 9;
-        let by_clock = members.iter().any(|member| member.feedback == Feedback::Clock);
-        Self {
-            members,
-            schedule,
-            deadline,
-            latest_start: deadline / if by_clock { 10 } else { 2 },
-            check: Check::Whole,
-            acknowledges: false,
-            announce_every: 0,
-        }
-    }
-}
-
-/// As in settings that were stored without a latest start.
-fn any_time() -> u64 {
-    u64::MAX
-}
-
-/// Timers of a centre.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum CentreTimer {
-    /// A slot begins.
-    SlotBegins,
-    /// The deadline of the slot: later reports are not used.
-    Deadline,
-}
-
-/// The receiver of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Recipient {
-    /// To all sensors.
-    All,
-    /// The sensor of this number, counted from 0.
-    Sensor(usize),
-}
-
-/// What the driver must do, in this order. A driver must handle every variant, so the enum is exhaustive.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Action {
-    /// Predict into this slot and call [`Centre::on_predicted`]. If the prediction fails, do nothing: the slot passes without update.
-    Predict {
-        /// The slot, counted from 1.
-        slot: u64,
-    },
-    /// Update with these observations, one per sensor: see [`update_or_drop`](crate::update_or_drop).
-    Update {
-        /// The slot.
-        slot: u64,
-        /// The observations; `None` for a sensor that answered other feedback than it was sent.
-        observed: Vec<Option<Observation<BitString>>>,
-    },
-    /// Send the bytes of a frame.
-    Send {
-        /// The receiver.
-        to: Recipient,
-        /// The frame's bytes.
-        frame: Vec<u8>,
-    },
-    /// Set a timer. It may fire late but not early.
-    SetTimer {
-        /// Time at which it fires, in nanoseconds.
-        at: u64,
-        /// The timer to pass to [`Centre::on_timer`].
-        timer: CentreTimer,
-    },
-    /// Record a note about a sensor.
-    Note {
-        /// The sensor's number.
-        sensor: usize,
-        /// The note.
-        note: Note,
-    },
-}
+use std::collections::BTreeSet;
 
 /// State machine of the centre of a star network. It takes events and returns [`Action`]s.
 ///
@@ -150,6 +42,9 @@ pub struct Centre {
     asked: bool,
     /// Per sensor the last slot in which it sent a frame to this centre.
     heard: Vec<Option<Slot>>,
+    /// The sensors that said last that their reports mean something else than this centre was told.
+    #[serde(default)]
+    unlike: BTreeSet<usize>,
 }
 
 impl Centre {
@@ -166,6 +61,7 @@ impl Centre {
             echoed: Some(0),
             asked: false,
             heard: vec![None; sensors],
+            unlike: BTreeSet::new(),
         }
     }
 
@@ -189,7 +85,18 @@ impl Centre {
         self.open
             && matches!(frame.kind, Kind::Report | Kind::Heartbeat)
             && frame.slot == Slot::of_count(self.slot)
-            && self.digests.get(sensor) == Some(&frame.digest)
+            && self.is_digest(sensor, frame.digest)
+    }
+
+    /// Whether the sensor says that its reports mean something else than this centre was told.
+    pub fn is_unlike(&self, sensor: usize) -> bool {
+        self.unlike.contains(&sensor)
+    }
+
+    /// Whether a digest is that of what the sensor was sent, with its meaning or without one.
+    fn is_digest(&self, sensor: usize, found: u32) -> bool {
+        let told = self.digests.get(sensor).map(|sent| sent ^ found);
+        told.is_some_and(|meaning| meaning == 0 || meaning == self.settings.meaning(sensor))
     }
 
     /// Tells the machine that the estimator has lost its state. It sends the whole state to followers next.
@@ -302,7 +209,9 @@ impl Centre {
         }
         // Only now: the echo above is made of the observations of the slot before.
         self.observed.fill(Observation::Nothing);
-        self.unusable.fill(false);
+        for (sensor, unusable) in self.unusable.iter_mut().enumerate() {
+            *unusable = self.unlike.contains(&sensor);
+        }
         self.echoed = None;
         self.open = true;
     }
@@ -352,23 +261,43 @@ impl Centre {
     pub fn on_decoded(&mut self, sensor: usize, frame: &Frame<'_>, actions: &mut Vec<Action>) {
         let (kind, slot) = (frame.kind, frame.slot);
         let mut note = |note| actions.push(Action::Note { sensor, note });
-        let Some(member) = self.settings.members.get(sensor) else {
+        let (is_digest, own) = (self.is_digest(sensor, frame.digest), self.settings.meaning(sensor));
+        let (Some(member), Some(sent)) = (self.settings.members.get(sensor), self.digests.get(sensor)) else {
             return note(Note::Unexpected { kind });
         };
         let observed = &mut self.observed[sensor];
+        let is_now = self.open && slot == Slot::of_count(self.slot);
+        // Only what is of this slot, or of none, tells what the sensor was told.
+        let found = match kind {
+            Kind::Heartbeat if slot == Slot::default() => frame.digest,
+            Kind::Heartbeat | Kind::Report if is_now => frame.digest ^ sent,
+            _ => 0,
+        };
+        let is_unlike = found != 0 && own != 0 && found != own;
+        if is_unlike {
+            self.unlike.insert(sensor);
+            self.unusable[sensor] = true;
+        } else if found != 0 || is_now {
+            // What answers this slot's question is an observation.
+            self.unusable[sensor] &= !(self.unlike.remove(&sensor) && is_now);
+        }
         match kind {
             Kind::Request => {
                 self.asked = true;
                 note(Note::Disagreement { slot });
             }
+            Kind::Heartbeat if is_unlike => note(Note::OtherMeaning { slot, found }),
             Kind::Heartbeat => note(Note::Heartbeat { slot }),
             // The order of these arms is the order of the checks: slot, repetition, digest, length.
-            Kind::Report if slot != Slot::of_count(self.slot) || !self.open => return note(Note::Late { slot }),
+            Kind::Report if !is_now => return note(Note::Late { slot }),
             Kind::Report if *observed != Observation::Nothing => note(Note::Duplicate { slot }),
-            Kind::Report if frame.digest != self.digests[sensor] => {
-                // The sensor answered other feedback than it was sent: the meaning of its report is unknown.
+            Kind::Report if !is_digest => {
+                // The sensor answered other feedback than it was sent, or was told another scheme: the meaning of its report is unknown.
                 (*observed, self.unusable[sensor]) = (Observation::Lost, true);
-                note(Note::Disagreement { slot });
+                note(match is_unlike {
+                    true => Note::OtherMeaning { slot, found },
+                    false => Note::Disagreement { slot },
+                });
             }
             Kind::Report if !member.report.allows(frame.payload.bits()) => {
                 *observed = Observation::Lost;
