@@ -120,7 +120,7 @@ impl InnovationWord {
     }
 
     /// The quantizer of the normalised innovation.
-    pub fn quantizer(&self) -> &'static LloydMax {
+    pub(crate) fn quantizer(&self) -> &'static LloydMax {
         self.quantizer
     }
 

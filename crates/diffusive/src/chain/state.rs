@@ -45,7 +45,7 @@ impl SearchState {
     }
 
     /// Probabilities of the models, in their order.
-    pub fn models(&self) -> Vec<f64> {
+    pub(crate) fn models(&self) -> Vec<f64> {
         self.alternatives.iter().map(|a| a.probability).collect()
     }
 }

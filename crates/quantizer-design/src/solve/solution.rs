@@ -205,20 +205,6 @@ impl Solution {
         MmseDecoder::new(&self.system, limit)
     }
 
-    /// The same sensors with other breakpoints; the certificate becomes [`Certificate::Unproved`].
-    ///
-    /// # Errors
-    /// If there is not one list per sensor, or a list has another length or is not increasing.
-    pub fn with_breakpoints(&self, breakpoints: Vec<Vec<f64>>) -> Result<Self, Error> {
-        entries("breakpoints", breakpoints.len(), self.sensors.len())?;
-        let mut cells = self.cells();
-        cells
-            .iter_mut()
-            .zip(breakpoints)
-            .for_each(|(cells, b)| cells.breakpoints = b);
-        self.with_cells(cells)
-    }
-
     pub(super) fn with_cells(&self, cells: Vec<WordedCells>) -> Result<Self, Error> {
         for cells in &cells {
             fewbits_quantizers::quantizer::check_increasing(&cells.breakpoints)?;
