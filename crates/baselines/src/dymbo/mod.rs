@@ -6,15 +6,19 @@
 //! | successive bits about one sample beside one word | [`iterated`] |
 //! | the exact moments after a first message, by enumeration of all reports | [`tree`] |
 //! | a filter beside the exact posterior of the same bits | [`gap`] |
+//! | the exact mean squared error of every scalar filter, without simulation | [`chain`] |
+//! | where the loss reaches a level; variances of several bits per slot, and under losses | [`steady`] |
 //! | what a first message is worth | [`first_message`] |
 //! | a filter of its own for sign bits of vector states, one after the other or at once | [`SignFilter`] |
 //! | the published centre of identical sensors over bits | [`centre`] |
 
 pub mod centre;
+pub mod chain;
 pub mod first_message;
 pub mod gap;
 pub mod iterated;
 pub mod skew_normal;
+pub mod steady;
 pub mod tree;
 mod vector;
 

@@ -4,14 +4,14 @@
 //! Monte-Carlo results; the figures reproduce them, and this test only makes sure that none is forgotten.
 
 use fewbits_baselines::dymbo::SignFilter;
+use fewbits_baselines::dymbo::chain::{self, TransientStep};
 use fewbits_baselines::dymbo::first_message::{first_message_mse, first_message_value};
-use fewbits_baselines::dymbo::{iterated, skew_normal, tree};
+use fewbits_baselines::dymbo::{iterated, skew_normal, steady, tree};
 use fewbits_core::factor::{Factor, Levels};
 use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
-use fewbits_dymbo::chain::{self, TransientStep};
 use fewbits_dymbo::{
     CountFusion, DymboFilter, MultibitFilter, Multiple, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant,
-    filtered_variance, sign_bit, steady,
+    filtered_variance, sign_bit,
 };
 use fewbits_filters::{
     PointMass, TransitionKernel, UniformGrid, assumed_density, kalman, scalar_fixed_lag_variance, steady_state,
@@ -220,7 +220,7 @@ fn steady_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
         "dymbo_filt" => dymbo.filtered_variance,
         "dymbo_pred" => dymbo.predicted_variance,
         "dymbo_gain" => DymboFilter::new(plant).steady_step().unwrap(),
-        "loss_riccati" => steady::loss(&plant).unwrap(),
+        "loss_riccati" => plant.loss().unwrap(),
         "dymbo_true_mse" => chain::dymbo_mse(&DymboFilter::new(plant)).unwrap(),
         "loss_true" => chain::true_loss(&plant).unwrap(),
         _ => return None,
@@ -230,13 +230,13 @@ fn steady_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
 fn loss_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
     let at = |a: f64, gamma: f64| ScalarPlant::with_noise_ratio(a, gamma).unwrap();
     let value = match entry.id.strip_prefix("loss.")? {
-        "max_unit_square" => steady::loss(&at(1.0, 1.0)),
+        "max_unit_square" => at(1.0, 1.0).loss(),
         "gamma_at_2_a1" => return steady::noise_ratio_at_loss(2.0, 1.0).unwrap().map(|g| vec![g]),
         "gamma_at_2_a0.9" => return steady::noise_ratio_at_loss(2.0, 0.9).unwrap().map(|g| vec![g]),
         "gamma_at_2_a0" => return steady::noise_ratio_at_loss(2.0, 0.0).unwrap().map(|g| vec![g]),
         "a_at_2_g1" => return steady::coefficient_at_loss(2.0, 1.0).unwrap().map(|a| vec![a]),
         // The approach to the limit is of first order in sqrt(gamma).
-        "a1_gamma_to_0" => steady::loss(&at(1.0, 1e-26)),
+        "a1_gamma_to_0" => at(1.0, 1e-26).loss(),
         "true_gamma_at_2_a1" => return chain::noise_ratio_at_loss(2.0, 1.0).unwrap().map(|g| vec![g]),
         "true_a_at_2_g1" => return chain::coefficient_at_loss(2.0, 1.0).unwrap().map(|a| vec![a]),
         "static_parameter" => {
@@ -254,7 +254,7 @@ fn grid_entry(entry: &Entry<'_>, loss: bool) -> Vec<f64> {
         gammas.iter().map(move |gamma| {
             let plant = ScalarPlant::with_noise_ratio(a, *gamma).unwrap();
             if loss {
-                steady::loss(&plant).unwrap()
+                plant.loss().unwrap()
             } else {
                 plant.steady_state(1.0).unwrap().filtered_variance
             }

@@ -1,6 +1,7 @@
 //! Closed forms of the steady state: limits, monotony, and the loss against the Kalman filter.
 
-use fewbits_dymbo::{ScalarPlant, chain, filtered_variance, steady};
+use fewbits_baselines::dymbo::{chain, steady};
+use fewbits_dymbo::{ScalarPlant, filtered_variance};
 use std::f64::consts::{FRAC_2_PI, PI};
 
 /// Of unit measurement noise.
@@ -15,7 +16,7 @@ fn kalman(a: f64, gamma: f64) -> f64 {
 
 /// Steady variance of the sign-bit filter over that of the Kalman filter.
 fn loss(a: f64, gamma: f64) -> f64 {
-    steady::loss(&plant(a, gamma)).unwrap()
+    plant(a, gamma).loss().unwrap()
 }
 
 fn assert_near(value: f64, expected: f64, tolerance: f64) {

@@ -2,7 +2,7 @@
 
 use super::common::{Plant, each, log_spaced};
 use crate::prelude::*;
-use fewbits_dymbo::{chain, steady};
+use fewbits_baselines::dymbo::{chain, steady};
 
 fn hundredths(i: i32) -> f64 {
     f64::from(i) / 100.0
@@ -53,7 +53,7 @@ impl Figure for Loss {
             let exact = p.exact_a.contains(&plant.a).then(|| chain::true_loss(&model));
             Ok::<_, Error>(Row {
                 plant: *plant,
-                loss_riccati: steady::loss(&model)?,
+                loss_riccati: model.loss()?,
                 loss_true: exact.transpose()?,
             })
         };

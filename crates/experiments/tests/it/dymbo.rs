@@ -1,14 +1,13 @@
 //! Sign bits over bad links, and about vectors.
 
 use super::{assert_agrees, assert_agrees_if_known, exact, trials};
-use fewbits_baselines::dymbo::SignFilter;
 use fewbits_baselines::dymbo::first_message::first_message_value;
 use fewbits_baselines::dymbo::gap::{SmoothedGap, Twin, exact_filter};
+use fewbits_baselines::dymbo::{SignFilter, chain, steady};
 use fewbits_core::factor::Levels;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Observed, Sensing, Sign};
 use fewbits_dymbo::{
-    CountFusion, DymboFilter, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant, chain, filtered_variance,
-    steady,
+    CountFusion, DymboFilter, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant, filtered_variance,
 };
 use fewbits_experiments::Measured;
 use fewbits_filters::{

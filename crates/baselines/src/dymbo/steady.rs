@@ -1,54 +1,36 @@
-//! Steady-state variances, and the loss against the Kalman filter: closed forms and contours.
+//! Contours of the loss against the Kalman filter, and steady-state variances of several bits per slot.
 
-use crate::plant::filtered_variance;
-use crate::{Error, ScalarPlant};
 use fewbits_core::Link;
+use fewbits_dymbo::{Error, ScalarPlant, filtered_variance, sign_bit};
 use fewbits_filters::ScalarSteadyState;
+use fewbits_models::Ar1;
 use fewbits_numerics::error::{ArgumentError, at_least_one, finite};
 use fewbits_numerics::roots::bracketed;
 use std::f64::consts::FRAC_2_PI;
 
-/// Steady filtered variance of the sign-bit filter divided by that of the Kalman filter on the same plant. It is at least 1 and
-/// increases with `|a|` and with `gamma`.
-///
-/// The paper prints the inverse (erratum `dymbo-3`). It also states that the ratio is below 2 for every `gamma < 1`; that holds for
-/// `|a| <= 0.979` (`dymbo-4`).
-///
-/// # Errors
-/// If the process noise is zero: both variances then vanish, or neither reaches a steady state.
-pub fn loss(plant: &ScalarPlant) -> Result<f64, Error> {
-    let dymbo = plant.steady_state(FRAC_2_PI)?.filtered_variance;
-    let kalman = plant.steady_state(1.0)?.filtered_variance;
-    if kalman > 0.0 {
-        Ok(dymbo / kalman)
-    } else {
-        Err(ArgumentError::new("process_variance", plant.process_variance(), "a variance above 0").into())
-    }
-}
-
-/// The noise ratio `gamma` at which [`loss`] reaches `level` for the given coefficient; `None` if it never does.
+/// The noise ratio `gamma` at which [`ScalarPlant::loss`] reaches `level` for the given coefficient; `None` if it never does.
 ///
 /// # Errors
 /// If `level` is 1 or less, or `|a| > 1`.
 pub fn noise_ratio_at_loss(level: f64, coefficient: f64) -> Result<Option<f64>, Error> {
     check_level(level)?;
-    let at = |log_gamma: f64| loss(&ScalarPlant::with_noise_ratio(coefficient, log_gamma.exp())?);
+    let at = |log_gamma: f64| ScalarPlant::with_noise_ratio(coefficient, log_gamma.exp())?.loss();
     Ok(crossing(level, LOG_GAMMA, at)?.map(f64::exp))
 }
 
-/// The coefficient `|a|` at which [`loss`] reaches `level` for the given noise ratio; `None` where it never does in `[0, 1]`.
+/// The coefficient `|a|` at which [`ScalarPlant::loss`] reaches `level` for the given noise ratio; `None` where it never does in `[0, 1]`.
 ///
 /// # Errors
 /// If `level` is 1 or less, or `noise_ratio` is not positive.
 pub fn coefficient_at_loss(level: f64, noise_ratio: f64) -> Result<Option<f64>, Error> {
     check_level(level)?;
-    crossing(level, (0.0, 1.0), |a| loss(&ScalarPlant::with_noise_ratio(a, noise_ratio)?))
+    crossing(level, (0.0, 1.0), |a| ScalarPlant::with_noise_ratio(a, noise_ratio)?.loss())
 }
 
 /// Range of `ln gamma` that is searched.
 const LOG_GAMMA: (f64, f64) = (-30.0, 30.0);
 
-pub(crate) fn check_level(level: f64) -> Result<(), Error> {
+fn check_level(level: f64) -> Result<(), Error> {
     if finite("level", level)? > 1.0 {
         Ok(())
     } else {
@@ -57,7 +39,7 @@ pub(crate) fn check_level(level: f64) -> Result<(), Error> {
 }
 
 /// Where an increasing function crosses `level` within `range`, if it does.
-pub(crate) fn crossing(
+pub(super) fn crossing(
     level: f64,
     (low, high): (f64, f64),
     function: impl Fn(f64) -> Result<f64, Error>,
@@ -87,7 +69,15 @@ pub(crate) fn crossing(
 /// # Errors
 /// If there is no finite bound.
 pub fn erasure_bound(plant: &ScalarPlant, link: &Link) -> Result<ScalarSteadyState, Error> {
-    plant.steady_state(crate::sign_bit::information(link) * link.arrival())
+    plant.steady_state(sign_bit::information(link) * link.arrival())
+}
+
+/// Refuses a plant that corrections of bounded size cannot hold.
+///
+/// # Errors
+/// If `|a| > 1`: an error beyond `gain / (|a| - 1)` then grows for ever, although the computed variance stays finite.
+pub(super) fn refuse_unstable(plant: &ScalarPlant) -> Result<(), Error> {
+    Ar1::new(plant.coefficient(), plant.process_variance()).map(drop)
 }
 
 /// The fixed point of a variance recursion. `slot` maps a predicted variance to the filtered one. It must be increasing and concave, and
@@ -95,11 +85,9 @@ pub fn erasure_bound(plant: &ScalarPlant, link: &Link) -> Result<ScalarSteadySta
 ///
 /// # Errors
 /// If the plant is unstable, or the recursion has no finite fixed point.
-pub(crate) fn settle(plant: &ScalarPlant, link: &Link, slot: impl Fn(f64) -> f64) -> Result<ScalarSteadyState, Error> {
-    plant.refuse_unstable()?;
-    let one_bit = plant
-        .steady_state(crate::sign_bit::information(link))?
-        .predicted_variance;
+pub(super) fn settle(plant: &ScalarPlant, link: &Link, slot: impl Fn(f64) -> f64) -> Result<ScalarSteadyState, Error> {
+    refuse_unstable(plant)?;
+    let one_bit = plant.steady_state(sign_bit::information(link))?.predicted_variance;
     let next = |p: f64| plant.dynamics().predict_variance(slot(p));
     // The recursion falls from one bit's fixed point to its own, and never below the process noise.
     let (low, high) = (plant.process_variance(), one_bit * (1.0 + 1e-9));
@@ -123,9 +111,9 @@ pub fn sequential_steady_state(plant: &ScalarPlant, sensors: usize) -> Result<Sc
 
 #[cfg(test)]
 mod tests {
-    use super::{coefficient_at_loss, crossing, erasure_bound, loss, noise_ratio_at_loss, sequential_steady_state};
-    use crate::{Error, ScalarPlant};
+    use super::{coefficient_at_loss, crossing, erasure_bound, noise_ratio_at_loss, sequential_steady_state};
     use fewbits_core::Link;
+    use fewbits_dymbo::{Error, ScalarPlant};
 
     #[test]
     fn contours_lie_on_the_surface() {
@@ -135,7 +123,7 @@ mod tests {
                 match noise_ratio_at_loss(level, a).unwrap() {
                     Some(gamma) => {
                         let plant = ScalarPlant::with_noise_ratio(a, gamma).unwrap();
-                        assert!((loss(&plant).unwrap() - level).abs() < 1e-12);
+                        assert!((plant.loss().unwrap() - level).abs() < 1e-12);
                     }
                     None => assert!(a == 1.0 && level < 1.2533),
                 }
@@ -143,7 +131,7 @@ mod tests {
         }
         assert_eq!(coefficient_at_loss(2.0, 0.5).unwrap(), None);
         assert!(noise_ratio_at_loss(1.0, 0.5).is_err() && noise_ratio_at_loss(2.0, 1.1).is_err());
-        assert!(loss(&ScalarPlant::new(0.5, 0.0, 1.0).unwrap()).is_err());
+        assert!(ScalarPlant::new(0.5, 0.0, 1.0).unwrap().loss().is_err());
     }
 
     #[test]
@@ -178,7 +166,7 @@ mod tests {
         let mut m = 1.0;
         for _ in 0..500 {
             m = (0..5).fold(plant.dynamics().predict_variance(m), |p, _| {
-                crate::filtered_variance(p, 1.0, std::f64::consts::FRAC_2_PI)
+                fewbits_dymbo::filtered_variance(p, 1.0, std::f64::consts::FRAC_2_PI)
             });
         }
         assert!((sequential_steady_state(&plant, 5).unwrap().filtered_variance - m).abs() < 1e-14);

@@ -1,8 +1,9 @@
 //! The stationary prediction error: mean squared errors and kurtosis after many slots.
 
 use super::{ErrorChain, MessageLaw};
-use crate::{DymboFilter, Error, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant, steady};
+use crate::dymbo::steady;
 use fewbits_core::Link;
+use fewbits_dymbo::{DymboFilter, Error, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant};
 use std::f64::consts::FRAC_2_PI;
 
 /// Moments of the stationary error.
@@ -22,7 +23,7 @@ pub struct StationaryError {
 /// # Errors
 /// If `|a| > 1` (no stationary law exists) or the process noise is zero; [`Error::NotConverged`] if the iteration does not converge.
 pub fn stationary(plant: &ScalarPlant, law: &MessageLaw) -> Result<StationaryError, Error> {
-    plant.refuse_unstable()?;
+    steady::refuse_unstable(plant)?;
     let largest = law.corrections().iter().fold(0.0, |m: f64, d| m.max(d.abs()));
     // A rough normal start; the width follows the density if this guess is too small.
     let mut guess = plant.steady_state(FRAC_2_PI)?.filtered_variance.max(largest * largest);
@@ -87,7 +88,7 @@ pub fn sequential_mse(plant: &ScalarPlant, sensors: usize) -> Result<f64, Error>
     Ok(stationary(plant, &MessageLaw::sequence(plant, p, sensors)?)?.filtered_mse)
 }
 
-/// Exact stationary mean squared error of the Dymbo filter divided by the Kalman filter's. [`steady::loss`] approximates it.
+/// Exact stationary mean squared error of the Dymbo filter divided by the Kalman filter's. [`ScalarPlant::loss`] approximates it.
 ///
 /// # Errors
 /// As [`stationary`].
@@ -128,13 +129,13 @@ pub fn coefficient_at_loss(level: f64, noise_ratio: f64) -> Result<Option<f64>, 
 
 #[cfg(test)]
 mod tests {
+    use super::super::{ErrorChain, MessageLaw};
     use super::{
         coefficient_at_loss, crossover_mse, dymbo_mse, multibit_mse, noise_ratio_at_loss, parallel_mse, sequential_mse,
         stationary, true_loss,
     };
-    use crate::chain::{ErrorChain, MessageLaw};
-    use crate::{CountFusion, DymboFilter, Error, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant};
     use fewbits_core::Link;
+    use fewbits_dymbo::{CountFusion, DymboFilter, Error, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant};
 
     fn plant() -> ScalarPlant {
         ScalarPlant::new(0.9, 0.5, 1.0).unwrap()
