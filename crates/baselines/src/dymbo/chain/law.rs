@@ -138,7 +138,7 @@ impl MessageLaw {
 mod tests {
     use super::MessageLaw;
     use fewbits_core::Link;
-    use fewbits_dymbo::{CountFusion, DymboFilter, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant};
+    use fewbits_dymbo::{CountFusion, DymboFilter, MultibitFilter, ParallelFilter, ScalarPlant};
     use fewbits_numerics::normal::{cdf, interval};
 
     fn plant() -> ScalarPlant {
@@ -182,7 +182,7 @@ mod tests {
             let bit = MessageLaw::bit(&DymboFilter::new(plant()), 1.1, &Link::flipping(0.2).unwrap()).unwrap();
             close(&probabilities(&bit, e), &[0.2 + 0.6 * cdf(-e), 0.2 + 0.6 * cdf(e)]);
             let words = MultibitFilter::new(plant(), 2).unwrap();
-            let edge = 2.1_f64.sqrt() * words.scheme().quantizer().breakpoints()[2];
+            let edge = 2.1_f64.sqrt() * fewbits_quantizers::lloyd_max::gaussian_table(2).unwrap().breakpoints()[2];
             let inner = [interval(-edge - e, -e), interval(-e, edge - e)];
             let expected = [cdf(-edge - e), inner[0], inner[1], cdf(e - edge)];
             close(&probabilities(&MessageLaw::word(&words, 1.1).unwrap(), e), &expected);
