@@ -121,7 +121,7 @@ impl RoundedSample {
 
     /// The reconstructed sample: the multiple times `tau`.
     #[inline]
-    pub fn value(&self, multiple: Multiple) -> f64 {
+    pub(crate) fn value(&self, multiple: Multiple) -> f64 {
         self.resolution * multiple.0 as f64
     }
 

@@ -115,7 +115,7 @@ impl InnovationWord {
     }
 
     /// Word length in bits, which is the format of the reports.
-    pub fn bits(&self) -> u32 {
+    pub(crate) fn bits(&self) -> u32 {
         self.bits
     }
 

@@ -75,6 +75,14 @@ impl ScalarPlant {
         Self::new(coefficient, noise_ratio, 1.0)
     }
 
+    /// Refuses a plant that corrections of bounded size cannot hold.
+    ///
+    /// # Errors
+    /// If `|a| > 1`: an error beyond `gain / (|a| - 1)` then grows for ever, although the computed variance stays finite.
+    pub(crate) fn refuse_unstable(&self) -> Result<(), Error> {
+        Ar1::new(self.coefficient(), self.process_variance()).map(drop)
+    }
+
     fn of(dynamics: Ar1, measurement_variance: f64) -> Result<Self, Error> {
         Ok(Self {
             dynamics,

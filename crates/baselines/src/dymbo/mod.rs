@@ -6,19 +6,17 @@
 //! | successive bits about one sample beside one word | [`iterated`] |
 //! | the exact moments after a first message, by enumeration of all reports | [`tree`] |
 //! | a filter beside the exact posterior of the same bits | [`gap`] |
-//! | the exact mean squared error of every scalar filter, without simulation | [`chain`] |
-//! | where the loss reaches a level; variances of several bits per slot, and under losses | [`steady`] |
+//! | where the loss reaches a level; a bound of the error under losses | [`contours`] |
 //! | what a first message is worth | [`first_message`] |
 //! | a filter of its own for sign bits of vector states, one after the other or at once | [`SignFilter`] |
 //! | the published centre of identical sensors over bits | [`centre`] |
 
 pub mod centre;
-pub mod chain;
+pub mod contours;
 pub mod first_message;
 pub mod gap;
 pub mod iterated;
 pub mod skew_normal;
-pub mod steady;
 pub mod tree;
 mod vector;
 

@@ -35,7 +35,7 @@ impl SearchState {
 
     /// The records of the nodes that have sampled, under the most probable model. After [`Search::decode`] of a belief it has only the
     /// records taken since.
-    pub fn records(&self) -> &[Record] {
+    pub(crate) fn records(&self) -> &[Record] {
         &self.alternatives[most_probable(&self.alternatives)].records
     }
 

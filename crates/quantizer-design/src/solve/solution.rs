@@ -32,11 +32,6 @@ impl Solutions {
         // A successful request has at least one design.
         &self.all[0]
     }
-
-    /// All designs, best first.
-    pub fn all(&self) -> &[Solution] {
-        &self.all
-    }
 }
 
 /// Cells and words of one sensor.

@@ -44,7 +44,7 @@ use crate::quantizer::check_increasing;
 use std::sync::OnceLock;
 
 /// Largest number of levels. For more levels a uniform quantizer with dither is as good.
-pub const MAX_LEVELS: usize = 4096;
+pub(crate) const MAX_LEVELS: usize = 4096;
 
 /// The Lloyd-Max quantizer of `density` with `levels` levels.
 ///

@@ -1,12 +1,11 @@
-//! Contours of the loss against the Kalman filter, and steady-state variances of several bits per slot.
+//! Contours of the loss against the Kalman filter, as its closed form predicts it and exact; and a bound of the error under losses.
 
 use fewbits_core::Link;
-use fewbits_dymbo::{Error, ScalarPlant, filtered_variance, sign_bit};
+use fewbits_dymbo::chain::true_loss;
+use fewbits_dymbo::{Error, ScalarPlant, sign_bit};
 use fewbits_filters::ScalarSteadyState;
-use fewbits_models::Ar1;
-use fewbits_numerics::error::{ArgumentError, at_least_one, finite};
+use fewbits_numerics::error::{ArgumentError, finite};
 use fewbits_numerics::roots::bracketed;
-use std::f64::consts::FRAC_2_PI;
 
 /// The noise ratio `gamma` at which [`ScalarPlant::loss`] reaches `level` for the given coefficient; `None` if it never does.
 ///
@@ -39,7 +38,7 @@ fn check_level(level: f64) -> Result<(), Error> {
 }
 
 /// Where an increasing function crosses `level` within `range`, if it does.
-pub(super) fn crossing(
+fn crossing(
     level: f64,
     (low, high): (f64, f64),
     function: impl Fn(f64) -> Result<f64, Error>,
@@ -72,47 +71,45 @@ pub fn erasure_bound(plant: &ScalarPlant, link: &Link) -> Result<ScalarSteadySta
     plant.steady_state(sign_bit::information(link) * link.arrival())
 }
 
-/// Refuses a plant that corrections of bounded size cannot hold.
+/// The true loss exceeds the predicted one by at most 1.2 % for `|a| <= 1`. A level is therefore reached slightly below the predicted
+/// place, and the search starts at this share of it.
+const CLOSE: f64 = 0.9;
+
+/// The noise ratio at which [`true_loss`] reaches `level` for the given coefficient. `None` if that does not happen within 10 %
+/// below [`noise_ratio_at_loss`].
 ///
 /// # Errors
-/// If `|a| > 1`: an error beyond `gain / (|a| - 1)` then grows for ever, although the computed variance stays finite.
-pub(super) fn refuse_unstable(plant: &ScalarPlant) -> Result<(), Error> {
-    Ar1::new(plant.coefficient(), plant.process_variance()).map(drop)
+/// As [`noise_ratio_at_loss`] and [`chain::stationary`](fewbits_dymbo::chain::stationary).
+pub fn noise_ratio_at_true_loss(level: f64, coefficient: f64) -> Result<Option<f64>, Error> {
+    let Some(predicted) = noise_ratio_at_loss(level, coefficient)? else {
+        return Ok(None);
+    };
+    let at = |log: f64| true_loss(&ScalarPlant::with_noise_ratio(coefficient, log.exp())?);
+    let root = crossing(level, ((CLOSE * predicted).ln(), predicted.ln()), at)?;
+    Ok(root.map(f64::exp))
 }
 
-/// The fixed point of a variance recursion. `slot` maps a predicted variance to the filtered one. It must be increasing and concave, and
-/// remove at least as much variance as one sign bit through the link.
+/// The coefficient at which [`true_loss`] reaches `level` for the given noise ratio. `None` if that does not happen within 10 %
+/// below [`coefficient_at_loss`].
 ///
 /// # Errors
-/// If the plant is unstable, or the recursion has no finite fixed point.
-pub(super) fn settle(plant: &ScalarPlant, link: &Link, slot: impl Fn(f64) -> f64) -> Result<ScalarSteadyState, Error> {
-    refuse_unstable(plant)?;
-    let one_bit = plant.steady_state(sign_bit::information(link))?.predicted_variance;
-    let next = |p: f64| plant.dynamics().predict_variance(slot(p));
-    // The recursion falls from one bit's fixed point to its own, and never below the process noise.
-    let (low, high) = (plant.process_variance(), one_bit * (1.0 + 1e-9));
-    let root = crossing(0.0, (low, high), |p| Ok(p - next(p)))?;
-    let predicted_variance = root.unwrap_or(one_bit);
-    Ok(ScalarSteadyState {
-        predicted_variance,
-        filtered_variance: slot(predicted_variance),
-    })
-}
-
-/// Steady state with `sensors >= 1` sign bits per slot. The threshold is refreshed after each bit.
-///
-/// # Errors
-/// If there is no sensor, or the plant is unstable.
-pub fn sequential_steady_state(plant: &ScalarPlant, sensors: usize) -> Result<ScalarSteadyState, Error> {
-    at_least_one("sensors", sensors)?;
-    let r = plant.measurement_variance();
-    settle(plant, &Link::PERFECT, |p| (0..sensors).fold(p, |p, _| filtered_variance(p, r, FRAC_2_PI)))
+/// As [`coefficient_at_loss`] and [`chain::stationary`](fewbits_dymbo::chain::stationary).
+pub fn coefficient_at_true_loss(level: f64, noise_ratio: f64) -> Result<Option<f64>, Error> {
+    let Some(predicted) = coefficient_at_loss(level, noise_ratio)? else {
+        return Ok(None);
+    };
+    let at = |a: f64| true_loss(&ScalarPlant::with_noise_ratio(a, noise_ratio)?);
+    crossing(level, (CLOSE * predicted, predicted), at)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{coefficient_at_loss, crossing, erasure_bound, noise_ratio_at_loss, sequential_steady_state};
+    use super::{
+        coefficient_at_loss, coefficient_at_true_loss, crossing, erasure_bound, noise_ratio_at_loss,
+        noise_ratio_at_true_loss,
+    };
     use fewbits_core::Link;
+    use fewbits_dymbo::chain::true_loss;
     use fewbits_dymbo::{Error, ScalarPlant};
 
     #[test]
@@ -157,18 +154,13 @@ mod tests {
         let alone = plant.dynamics().stationary_variance().unwrap();
         assert!((at(Link::flipping(0.5).unwrap()) - alone).abs() < 1e-12);
         assert!((at(Link::lossy(1.0 - 1e-12).unwrap()) - alone).abs() < 1e-10);
-        let one = sequential_steady_state(&plant, 1).unwrap().filtered_variance;
-        assert!((one - at(Link::PERFECT)).abs() < 1e-13);
-        assert!(sequential_steady_state(&plant, 0).is_err());
-        let wild = ScalarPlant::new_unstable(-3.0, 0.5, 1.0).unwrap();
-        assert!(matches!(sequential_steady_state(&wild, 3), Err(Error::Argument(e)) if e.value == "-3"));
-        // The fixed point of five steps in a row, found by walking to it.
-        let mut m = 1.0;
-        for _ in 0..500 {
-            m = (0..5).fold(plant.dynamics().predict_variance(m), |p, _| {
-                fewbits_dymbo::filtered_variance(p, 1.0, std::f64::consts::FRAC_2_PI)
-            });
-        }
-        assert!((sequential_steady_state(&plant, 5).unwrap().filtered_variance - m).abs() < 1e-14);
+    }
+
+    #[test]
+    fn true_losses_lie_on_their_contours() {
+        let gamma = noise_ratio_at_true_loss(2.0, 0.95).unwrap().unwrap();
+        assert!((true_loss(&ScalarPlant::with_noise_ratio(0.95, gamma).unwrap()).unwrap() - 2.0).abs() < 1e-11);
+        assert_eq!(noise_ratio_at_true_loss(1.2, 1.0), Ok(None));
+        assert_eq!(coefficient_at_true_loss(2.0, 0.5), Ok(None));
     }
 }
