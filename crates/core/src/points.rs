@@ -107,7 +107,7 @@ pub(crate) fn check<const D: usize>(states: &mut ColumnsMut<'_, D>, weights: &[f
 /// # Errors
 /// [`Error::Impossible`] if the observation has probability zero; [`Error::NotANumber`] if a number overflows or is NaN; if there is not
 /// one weight per point. The points are then unchanged.
-pub(crate) fn move_points<const D: usize, const M: usize>(
+pub fn move_points<const D: usize, const M: usize>(
     mut states: ColumnsMut<'_, D>,
     weights: &[f64],
     observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,

@@ -235,7 +235,7 @@ impl<const D: usize> Tree<D> {
     }
 
     /// The kernels in the tree's order, in which those of a node are contiguous.
-    pub(crate) fn order(&self) -> &[usize] {
+    pub fn order(&self) -> &[usize] {
         &self.order
     }
 

@@ -73,7 +73,7 @@ impl Lora {
     }
 
     /// Time on air of a frame of `bytes` bytes behind the preamble, LoRaWAN's own 13 included.
-    pub(crate) fn time_on_air(&self, bytes: u64) -> Seconds {
+    pub fn time_on_air(&self, bytes: u64) -> Seconds {
         let symbol = self.symbol().value();
         let saved = if symbol >= SLOW_SYMBOL { 2.0 } else { 0.0 };
         let spreading = f64::from(self.spreading);

@@ -96,7 +96,7 @@ pub(crate) const CC2420_OUTPUT: [(f64, f64); 8] = [
 ];
 
 impl Radio {
-    /// The CC2420 with two AA cells, at an output power of [`CC2420_OUTPUT`].
+    /// The CC2420 with two AA cells, at one of the eight output powers of its data sheet, in dBm.
     ///
     /// # Errors
     /// If `output_dbm` is none of the eight.

@@ -37,7 +37,7 @@ pub(crate) fn fisher_information(system: &System) -> Result<Vec<f64>, Error> {
 /// Fisher information averaged over the prior.
 ///
 /// # Errors
-/// As [`fisher_information`].
+/// [`Error::Argument`] if the noise is correlated.
 pub fn mean_fisher_information(system: &System) -> Result<f64, Error> {
     let information = fisher_information(system)?;
     Ok(information
