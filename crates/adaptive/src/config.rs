@@ -137,7 +137,7 @@ impl Config {
     }
 
     /// Whether packets have a counter and a refresh flag.
-    pub fn is_resilient(&self) -> bool {
+    pub(crate) fn is_resilient(&self) -> bool {
         self.0.is_resilient()
     }
 }

@@ -159,19 +159,9 @@ impl FixedRate {
         })
     }
 
-    /// Bits of a word.
-    pub fn bits(&self) -> u32 {
-        self.bits
-    }
-
     /// The estimate of the last sample.
     pub fn estimate(&self) -> f64 {
         self.belief.moment_matched().mean()[0]
-    }
-
-    /// Probabilities of the models.
-    pub fn model_weights(&self) -> &[f64] {
-        self.belief.probabilities()
     }
 
     /// Encodes a sample and updates the state (sensor's half).

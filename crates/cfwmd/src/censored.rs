@@ -65,7 +65,7 @@ impl<const M: usize> Censored<M> {
     ///
     /// # Errors
     /// If `probability` is outside `[0, 1]`.
-    pub fn constant(probability: f64) -> Result<Self, ArgumentError> {
+    pub(crate) fn constant(probability: f64) -> Result<Self, ArgumentError> {
         Ok(Self::scalar(Levels::constant(probability)?))
     }
 
@@ -73,7 +73,11 @@ impl<const M: usize> Censored<M> {
     ///
     /// # Errors
     /// If a number is not finite or `R` not positive definite.
-    pub fn value(value: &SVector<f64, M>, noise: &SMatrix<f64, M, M>, arrival: f64) -> Result<Self, ArgumentError> {
+    pub(crate) fn value(
+        value: &SVector<f64, M>,
+        noise: &SMatrix<f64, M, M>,
+        arrival: f64,
+    ) -> Result<Self, ArgumentError> {
         Self::scaled(Value::new(*value, *noise)?, arrival.ln())
     }
 
@@ -163,7 +167,7 @@ impl<const M: usize> Censored<M> {
     ///
     /// # Errors
     /// If a number is not finite, or the level's cell lies within the interval of silence.
-    pub fn level(
+    pub(crate) fn level(
         value: f64,
         levels: &number::Levels,
         rule: &CensoringRule<M>,

@@ -107,7 +107,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
     ///
     /// # Errors
     /// If the measurement or the prediction is not finite.
-    pub fn report(
+    pub(crate) fn report(
         &self,
         measurement: &SVector<f64, M>,
         broadcast: &SVector<f64, D>,

@@ -254,7 +254,7 @@ impl<const D: usize> FactoredGaussian<D> {
     }
 
     /// `ln` of the density at the mean.
-    pub fn log_peak(&self) -> f64 {
+    pub(crate) fn log_peak(&self) -> f64 {
         self.log_peak
     }
 

@@ -38,15 +38,6 @@ impl<R> Observation<R> {
             Self::Nothing | Self::Lost => None,
         }
     }
-
-    /// The same observation, with `f` applied to the report.
-    pub fn map<T>(self, f: impl FnOnce(R) -> T) -> Observation<T> {
-        match self {
-            Self::Received(report) => Observation::Received(f(report)),
-            Self::Nothing => Observation::Nothing,
-            Self::Lost => Observation::Lost,
-        }
-    }
 }
 
 impl<R> From<Option<R>> for Observation<R> {

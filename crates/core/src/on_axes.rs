@@ -32,16 +32,6 @@ impl<S, const D: usize, const K: usize> OnAxes<S, D, K> {
         Ok(Self { sensing, axes })
     }
 
-    /// The sensing model of the `K` coordinates.
-    pub fn sensing(&self) -> &S {
-        &self.sensing
-    }
-
-    /// The coordinates of the state that it reads.
-    pub fn axes(&self) -> &[usize; K] {
-        &self.axes
-    }
-
     fn read(&self, state: &SVector<f64, D>) -> SVector<f64, K> {
         SVector::from_fn(|k, _| state[self.axes[k]])
     }

@@ -94,11 +94,6 @@ impl SensorField {
         })
     }
 
-    /// The domain.
-    pub fn domain(&self) -> &Arc<Domain> {
-        &self.domain
-    }
-
     /// Response of the sensor of this index at the age of this index, per free cell, kg/m^3 per kg/s. `None` if there is no such sensor or
     /// age.
     pub fn response(&self, sensor: usize, age: usize) -> Option<&[f64]> {

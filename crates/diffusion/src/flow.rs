@@ -31,7 +31,7 @@ impl Flow {
     }
 
     /// Net flow out of each free cell, m^3/s.
-    pub fn divergence(&self, domain: &Domain) -> Vec<f64> {
+    pub(crate) fn divergence(&self, domain: &Domain) -> Vec<f64> {
         let mut net = vec![0.0; domain.free().len() + OUTSIDE];
         for (face, flow) in domain.faces.iter().zip(&self.upwards) {
             net[face.cells[0]] += flow;

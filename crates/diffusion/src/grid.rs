@@ -51,7 +51,7 @@ impl Grid {
     }
 
     /// Number of axes.
-    pub fn dimension(&self) -> usize {
+    pub(crate) fn dimension(&self) -> usize {
         self.dimension
     }
 
@@ -86,7 +86,7 @@ impl Grid {
 
     /// Width of the cells in one column (line, layer) of an axis, m.
     #[inline]
-    pub fn width(&self, axis: usize, at: usize) -> f64 {
+    pub(crate) fn width(&self, axis: usize, at: usize) -> f64 {
         self.edges[axis][at + 1] - self.edges[axis][at]
     }
 
@@ -97,7 +97,7 @@ impl Grid {
     }
 
     /// Volume of a cell, m^3; its area in a plane, its length on a line.
-    pub fn volume(&self, cell: usize) -> f64 {
+    pub(crate) fn volume(&self, cell: usize) -> f64 {
         self.across(self.place(cell), None)
     }
 

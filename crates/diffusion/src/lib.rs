@@ -9,7 +9,7 @@
 //!
 //! | question | answer |
 //! |---|---|
-//! | which cells are air, and the boundary conditions | [`Plan`] (text, PBM), [`Domain`] |
+//! | which cells are air, and the boundary conditions | [`Plan`] (text), [`Domain`] |
 //! | the wind: potential flow, a function, measured velocities | [`PotentialFlow`], [`Flow`] |
 //! | a room, its wind and its concentrations from files of the simulator GADEN | [`gaden::Room`], [`gaden::Table`] |
 //! | diffusivity, decay, the matrix, and where the substance goes | [`Transport`], [`Budget`] |

@@ -44,28 +44,6 @@ impl Plan {
         Self { lines: lines.collect() }.checked()
     }
 
-    /// Reads a plain PBM picture (`P1`, width, height, then pixels; `#` begins a comment): 1 (black) is wall, 0 (white) is air. Air on
-    /// the picture's edge is closed there; use [`Plan::with`] for openings.
-    ///
-    /// # Errors
-    /// If the text is not such a picture.
-    pub fn from_pbm(text: &str) -> Result<Self, Error> {
-        let uncommented = text.lines().map(|line| line.split('#').next().unwrap_or(""));
-        let mut words = uncommented.flat_map(str::split_ascii_whitespace);
-        let magic = words.next();
-        let mut size = || words.next()?.parse::<usize>().ok().filter(|n| *n > 0);
-        let (Some("P1"), Some(columns), Some(lines)) = (magic, size(), size()) else {
-            return refuse("picture", "no plain PBM", "`P1`, width and height");
-        };
-        let pixels: Vec<char> = words.flat_map(str::chars).collect();
-        if columns.checked_mul(lines) != Some(pixels.len()) || pixels.iter().any(|pixel| !"01".contains(*pixel)) {
-            return refuse("picture", format!("{} pixels", pixels.len()), format!("{columns} times {lines} of 0 or 1"));
-        }
-        let square = |pixel: &char| if *pixel == '1' { '#' } else { '.' };
-        let lines = pixels.chunks(columns).map(|line| line.iter().map(square).collect());
-        Ok(Self { lines: lines.collect() })
-    }
-
     /// The plan with another character in some squares, given by column and line.
     ///
     /// # Errors

@@ -32,7 +32,7 @@ impl Fit {
 
     /// Whether the sum exceeds the quantile that a chi-squared variable exceeds with probability `level`. The quantile is that of Wilson
     /// and Hilferty (1931): the cube root is nearly normal. From five samples on it is accurate to one per cent.
-    pub fn is_refused(&self, level: f64) -> bool {
+    pub(crate) fn is_refused(&self, level: f64) -> bool {
         let spread = 2.0 / (9.0 * self.samples as f64);
         let limit = (1.0 - spread + quantile(1.0 - level) * spread.sqrt()).max(0.0).powi(3);
         // A sum that is NaN counts as refused.

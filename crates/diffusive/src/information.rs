@@ -96,11 +96,6 @@ impl Predictions {
         Bounds { lower, upper }
     }
 
-    /// `(1/2) ln det(I + Cov / sigma^2)`, nats: the mutual information if the predictions were Gaussian. It is an upper bound.
-    pub fn gaussian_bound(&self) -> f64 {
-        half_log_det_plus_one(self.covariance())
-    }
-
     fn covariance(&self) -> DMatrix<f64> {
         let samples = self.means.ncols();
         let mut mean = DVector::zeros(samples);

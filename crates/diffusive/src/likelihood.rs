@@ -33,7 +33,7 @@ impl SourceLikelihood {
     }
 
     /// The model of the rate.
-    pub fn rate(&self) -> &RateModel {
+    pub(crate) fn rate(&self) -> &RateModel {
         &self.rate
     }
 
@@ -94,7 +94,7 @@ impl SourceLikelihood {
 
     /// Expected sum of squared residuals over the noise variance, with the source at `position`. The expectation is over the rate
     /// given the position and these records.
-    pub fn chi_squared(&self, position: &Vector2<f64>) -> f64 {
+    pub(crate) fn chi_squared(&self, position: &Vector2<f64>) -> f64 {
         let mut total = 0.0;
         self.each_group(position, None, |_, sums| total += sums.chi_squared(self.rate.given_position(sums)));
         total

@@ -67,22 +67,17 @@ impl ModelGrid {
     }
 
     /// Number of models.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.sensors.len()
     }
 
-    /// Never true: there is at least one model.
-    pub fn is_empty(&self) -> bool {
-        self.sensors.is_empty()
-    }
-
     /// The instants at which the sensors sample, s.
-    pub fn instants(&self) -> &[f64] {
+    pub(crate) fn instants(&self) -> &[f64] {
         self.sensors.first().map_or(&[], SourceSensor::instants)
     }
 
     /// Standard deviation of the sensors' noise, kg/m^3.
-    pub fn noise(&self) -> f64 {
+    pub(crate) fn noise(&self) -> f64 {
         // There is at least one model.
         self.sensors.first().map_or(f64::NAN, SourceSensor::noise)
     }

@@ -174,7 +174,7 @@ impl RateSums {
     }
 
     /// The sums of both together.
-    pub fn plus(&self, other: &Self) -> Self {
+    pub(crate) fn plus(&self, other: &Self) -> Self {
         Self {
             response: self.response + other.response,
             correlation: self.correlation + other.correlation,

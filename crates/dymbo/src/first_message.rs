@@ -99,11 +99,6 @@ impl RoundedSample {
         self.resolution
     }
 
-    /// Word length in bits, which is the format of the reports.
-    pub fn bits(&self) -> u32 {
-        self.bits
-    }
-
     /// Smallest and largest multiple that the word can hold.
     fn range(&self) -> (i64, i64) {
         let half = 1_i64 << (self.bits - 1);
@@ -126,7 +121,7 @@ impl RoundedSample {
 
     /// The reconstructed sample: the multiple times `tau`.
     #[inline]
-    pub fn value(&self, multiple: Multiple) -> f64 {
+    pub(crate) fn value(&self, multiple: Multiple) -> f64 {
         self.resolution * multiple.0 as f64
     }
 

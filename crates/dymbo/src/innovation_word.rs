@@ -115,12 +115,12 @@ impl InnovationWord {
     }
 
     /// Word length in bits, which is the format of the reports.
-    pub fn bits(&self) -> u32 {
+    pub(crate) fn bits(&self) -> u32 {
         self.bits
     }
 
     /// The quantizer of the normalised innovation.
-    pub fn quantizer(&self) -> &'static LloydMax {
+    pub(crate) fn quantizer(&self) -> &'static LloydMax {
         self.quantizer
     }
 

@@ -16,7 +16,7 @@
 //! | the filter, one bit | [`DymboFilter`] |
 //! | several bits per sample, several sensors, vector states | [`MultibitFilter`], [`ParallelFilter`], the factor of [`SignBit`] in any filter of `fewbits_filters` |
 //! | one slot of sensor, link and filter in one call | [`ScalarFilter::exchange`] |
-//! | expected errors | [`steady`] (closed forms, contours), [`chain`] (exact errors) |
+//! | expected errors | [`ScalarPlant::steady_state`], [`ScalarPlant::loss`] (closed forms), [`chain`] (exact errors) |
 //!
 //! The likelihood of a report is a [`Factor`](fewbits_core::Factor), for any threshold and any [`Link`](fewbits_core::Link).
 //! `fewbits_filters::assumed_density::update` applies it to a Gaussian belief; the filters here are closed forms of that update. A

@@ -86,11 +86,6 @@ impl MultibitFilter {
         }
     }
 
-    /// The broadcast for the next sample, given the present filtered belief: predicted measurement and innovation deviation.
-    pub fn broadcast(&self, belief: &Gaussian<1>) -> Prediction {
-        self.feedback(&self.predict(belief))
-    }
-
     /// Per word: `E[z | word received]` and the word's probability, `z` the normalised innovation.
     pub fn levels(&self) -> &[(f64, f64)] {
         &self.levels
@@ -207,7 +202,7 @@ mod tests {
                 let (posterior, info) = filter.step(&belief, &word).unwrap();
                 let factor = filter
                     .scheme()
-                    .factor(&filter.broadcast(&belief), &word, &link)
+                    .factor(&filter.feedback(&predicted), &word, &link)
                     .unwrap();
                 let (exact, seen) = assumed_density::update(&predicted, &Matrix1::identity(), &factor).unwrap();
                 assert!((posterior.mean()[0] - exact.mean()[0]).abs() < 1e-12);

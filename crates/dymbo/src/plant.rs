@@ -4,8 +4,10 @@ use crate::Error;
 use fewbits_core::Gaussian;
 use fewbits_filters::{ScalarSteadyState, scalar_steady_state};
 use fewbits_models::{Ar1, LinearSensor};
+use fewbits_numerics::ArgumentError;
 use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::FRAC_2_PI;
 
 /// A first-order autoregression `theta(n) = a theta(n-1) + u(n)` sensed as `x(n) = theta(n) + w(n)`.
 ///
@@ -133,6 +135,24 @@ impl ScalarPlant {
     /// If `information` is outside `[0, 1]`, or there is no finite steady state.
     pub fn steady_state(&self, information: f64) -> Result<ScalarSteadyState, Error> {
         scalar_steady_state(self.coefficient(), self.process_variance(), self.measurement_variance(), information)
+    }
+
+    /// Steady filtered variance of the sign-bit filter divided by that of the Kalman filter. It is at least 1 and increases with `|a|` and
+    /// with `gamma`.
+    ///
+    /// The paper prints the inverse (erratum `dymbo-3`). It also states that the ratio is below 2 for every `gamma < 1`; that holds for
+    /// `|a| <= 0.979` (`dymbo-4`).
+    ///
+    /// # Errors
+    /// If the process noise is zero: both variances then vanish, or neither reaches a steady state.
+    pub fn loss(&self) -> Result<f64, Error> {
+        let dymbo = self.steady_state(FRAC_2_PI)?.filtered_variance;
+        let kalman = self.steady_state(1.0)?.filtered_variance;
+        if kalman > 0.0 {
+            Ok(dymbo / kalman)
+        } else {
+            Err(ArgumentError::new("process_variance", self.process_variance(), "a variance above 0").into())
+        }
     }
 }
 

@@ -63,11 +63,6 @@ impl SignBit {
             noise_variance: plant.measurement_variance(),
         }
     }
-
-    /// Measurement variance `sigma^2`.
-    pub fn noise_variance(&self) -> f64 {
-        self.noise_variance
-    }
 }
 
 impl MeasurementNoise<1> for SignBit {
@@ -174,7 +169,7 @@ mod tests {
     #[test]
     fn refuses_what_is_no_number() {
         assert!(SignBit::new(0.0).is_err() && expected_information(f64::NAN, &Link::PERFECT).is_err());
-        assert_eq!(SignBit::new(1.7).unwrap().noise_variance(), 1.7);
+        assert_eq!(SignBit::new(1.7).unwrap().noise_variance, 1.7);
         let scheme = SignBit::new(1.0).unwrap();
         for observation in [
             Observation::Received(Sign::Above),

@@ -93,11 +93,6 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> Imm<D, F> {
         })
     }
 
-    /// The filters, in the order of the belief's modes.
-    pub fn filters(&self) -> &[F] {
-        &self.filters
-    }
-
     fn check(&self, belief: &ImmBelief<D>) -> Result<(), ArgumentError> {
         if belief.modes().len() == self.filters.len() {
             return Ok(());

@@ -50,7 +50,7 @@ impl<const D: usize> BootstrapFilter<D> {
     ///
     /// # Errors
     /// As [`ResamplingRule::resample`].
-    pub fn resample(&mut self, rng: &mut dyn Rng, belief: &mut Particles<D>) -> Result<bool, Error> {
+    pub(crate) fn resample(&mut self, rng: &mut dyn Rng, belief: &mut Particles<D>) -> Result<bool, Error> {
         self.rule.resample(rng, belief, &mut self.ancestors)
     }
 

@@ -17,7 +17,7 @@ pub struct Handover<const D: usize> {
 
 impl<const D: usize> Handover<D> {
     /// A mixture that is handed over as real numbers, without counting bits.
-    pub fn real(mixture: Mixture<D>) -> Self {
+    pub(crate) fn real(mixture: Mixture<D>) -> Self {
         Self { mixture, message: None }
     }
 

@@ -1,10 +1,10 @@
 //! The fusion centre of `fewbits-filters` as a [`Receiver`] over bits.
 
-use fewbits_core::{BitString, Observation};
-use fewbits_filters::centre::{CentreState, Event, FusionCentre, Slot};
+use fewbits_core::{BitString, Event, Observation};
+use fewbits_filters::centre::{CentreState, FusionCentre, Slot};
 use fewbits_filters::contract::StateFilter;
 use fewbits_monte_carlo::Stream;
-use fewbits_protocol::{BoxError, Receiver, ReceiverEvent, SensorHealth};
+use fewbits_protocol::{BoxError, Receiver, SensorHealth};
 use serde::{Serialize, de::DeserializeOwned};
 
 /// First byte of a state: CBOR follows behind two numbers. JSON begins otherwise.
@@ -107,25 +107,9 @@ where
         judged.collect::<Option<_>>().unwrap_or_default()
     }
 
-    fn events(&self) -> Vec<ReceiverEvent> {
-        let place = |number: u32| self.numbers.binary_search(&number).ok();
-        let event = |event: &Event| {
-            Some(match *event {
-                Event::Dead(number) => ReceiverEvent::Dead(place(number)?),
-                Event::Alive(number) => ReceiverEvent::Alive(place(number)?),
-                Event::Excluded(number) => ReceiverEvent::Excluded(place(number)?),
-                Event::Readmitted(number) => ReceiverEvent::Readmitted(place(number)?),
-                Event::Lost => ReceiverEvent::Lost,
-                Event::NoiseOverstated => ReceiverEvent::NoiseOverstated,
-                Event::Reacquired => ReceiverEvent::Reacquired,
-                Event::Rejected(number) => ReceiverEvent::Rejected(place(number)?),
-                Event::Disputed(number) => ReceiverEvent::Disputed(place(number)?),
-                Event::Copied(number) => ReceiverEvent::Copied(place(number)?),
-                Event::Reopened => ReceiverEvent::Reopened,
-                _ => return None,
-            })
-        };
-        self.events.iter().filter_map(event).collect()
+    fn events(&self) -> Vec<Event> {
+        let place = |number| self.numbers.binary_search(&number).ok().map(|place| place as u32);
+        self.events.iter().filter_map(|event| event.renumbered(place)).collect()
     }
 
     fn state(&self) -> Result<BitString, BoxError> {

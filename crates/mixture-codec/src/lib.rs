@@ -12,7 +12,6 @@
 //! | the message as numbers in double, single or fixed precision | [`wire::RoundedMixture`] |
 //! | the best message within a number of bits | [`wire::RateControl`] |
 //! | the difference between two densities, estimated at points | [`plug_in`] |
-//! | the same integrated over all of space, in one to three dimensions | [`quadrature`] |
 //! | the same in closed form, and which measure bounds which | [`divergence`] |
 //! | the single steps of a reduction | [`tree`], [`cut`], [`merge`], [`refine`] |
 //!
@@ -40,8 +39,8 @@ pub mod reduction;
 pub mod tree;
 pub mod wire;
 
+pub use divergence::plug_in;
 pub use divergence::plug_in::{Cubature, PlugIn};
-pub use divergence::{plug_in, quadrature};
 pub use fewbits_core::Error;
 pub use reduction::cut::{Criterion, Cut, NodeErrors};
 pub use reduction::merge::MergeCost;

@@ -88,7 +88,7 @@ pub struct Tree<const D: usize> {
 }
 
 /// The root.
-pub const ROOT: usize = 0;
+pub(crate) const ROOT: usize = 0;
 
 impl<const D: usize> Tree<D> {
     /// Builds the tree. Kernels of weight zero are left out.

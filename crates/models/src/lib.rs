@@ -17,7 +17,6 @@
 //! | white-noise acceleration on a line, in a plane | [`constant_velocity_1d`], [`constant_velocity_2d`] |
 //! | linear in continuous time (Ornstein-Uhlenbeck, nearly constant velocity, random walk) | [`ContinuousLinear`], [`AffineGaussian`] |
 //! | dynamics and sensing of one's own, with Jacobians by automatic differentiation | [`AutoDynamics`], [`AutoSensing`], [`Flow`] |
-//! | one of several models at a time, such as a manoeuvring target | [`Switching`], for an IMM filter |
 //! | linear sensing, scalar and vector | [`ScalarSensor`], [`LinearSensor`] |
 //! | received amplitude that falls with distance | [`ReceivedPower`] |
 //! | a substance that diffuses through air, ground, vessels | [`diffusion`] |
@@ -48,7 +47,6 @@ mod linear_gaussian;
 mod linear_sensor;
 mod received_power;
 mod source_model;
-mod switching;
 
 pub use ar1::Ar1;
 pub use auto::{AutoDynamics, AutoSensing, Differentiable, DualNum, Flow, Number};
@@ -59,5 +57,4 @@ pub use linear_gaussian::LinearGaussian;
 pub use linear_sensor::{LinearSensor, ScalarSensor};
 pub use received_power::ReceivedPower;
 pub use source_model::{Homogeneous, Receptor, SourceGradient, SourceModel};
-pub use switching::Switching;
 pub use {nalgebra, rand};

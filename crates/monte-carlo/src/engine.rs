@@ -111,11 +111,6 @@ impl<'a> MonteCarlo<'a> {
         }
     }
 
-    /// Number of trials.
-    pub fn trials(&self) -> u64 {
-        self.trials
-    }
-
     /// The trial of the given index.
     pub fn trial(&self, index: u64) -> Trial {
         Trial {

@@ -35,7 +35,7 @@ impl Clock {
     }
 
     /// Time from the beginning of a slot to its deadline.
-    pub fn reporting_time(&self) -> Seconds {
+    pub(crate) fn reporting_time(&self) -> Seconds {
         Instant(self.deadline).since_start()
     }
 

@@ -112,14 +112,6 @@ pub enum Error {
 }
 
 impl Error {
-    /// The refused argument, if that is the error.
-    pub fn argument(&self) -> Option<&ArgumentError> {
-        match self {
-            Self::Argument(argument) => Some(argument),
-            _ => None,
-        }
-    }
-
     /// Wraps the error of the estimator `name`.
     pub fn estimator(name: &'static str, source: impl Into<Cause>) -> Self {
         Self::Estimator {

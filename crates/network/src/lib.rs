@@ -70,10 +70,7 @@ pub use clock::Clock;
 pub use error::{Cause, Error};
 pub use fewbits_protocol::{Check, Frame, Kind};
 pub use measurements::Measurements;
-pub use medium::{
-    CC2420_OUTPUT, Channel, FRAGMENT_OVERHEAD, Field, LORAWAN_OVERHEAD, Lora, Loss, Radio, ReceivedCopy, TWO_AA_CELLS,
-    Transceiver, on_air,
-};
+pub use medium::{Channel, Field, Lora, Loss, Radio, ReceivedCopy, TWO_AA_CELLS, Transceiver, on_air};
 pub use note::{Note, Stage};
 pub use protocols::{BitNode, BitStar, CentreNode, SensingNode, SlotEstimate, StoredBitNode, Walk, WalkNode};
 pub use simulator::{

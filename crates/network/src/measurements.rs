@@ -33,7 +33,7 @@ impl<M> Measurements<M> {
     }
 
     /// Number of slots.
-    pub fn slots(&self) -> u32 {
+    pub(crate) fn slots(&self) -> u32 {
         match &self.0 {
             Source::Table(table) => u32::try_from(table.len()).unwrap_or(u32::MAX),
             Source::Function { slots, .. } => *slots,

@@ -26,7 +26,7 @@ pub fn round(x: f32) -> f32 {
 
 /// `2^x` for `x` clamped to `-100..=100`, within `3e-7` relative.
 #[inline(always)]
-pub fn exp2(x: f32) -> f32 {
+pub(crate) fn exp2(x: f32) -> f32 {
     power(x.clamp(-100.0, 100.0))
 }
 

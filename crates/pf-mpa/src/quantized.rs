@@ -99,8 +99,6 @@ impl Message for RangeReference {
 pub struct QuantizedRange {
     labelling: Labelling,
     noise: RangeNoise,
-    /// Number format of a broadcast reference.
-    format: NumberFormat,
 }
 
 impl QuantizedRange {
@@ -112,7 +110,6 @@ impl QuantizedRange {
         Ok(Self {
             labelling: Labelling::natural(levels)?,
             noise,
-            format: NumberFormat::Single,
         })
     }
 
@@ -120,12 +117,6 @@ impl QuantizedRange {
     #[must_use]
     pub fn with_labelling(self, labelling: Labelling) -> Self {
         Self { labelling, ..self }
-    }
-
-    /// The same sensor with another number format of a broadcast reference.
-    #[must_use]
-    pub fn with_format(self, format: NumberFormat) -> Self {
-        Self { format, ..self }
     }
 
     /// Number of levels `L`.
@@ -177,7 +168,7 @@ impl Quantized for QuantizedRange {
     type Report = Symbol;
 
     fn format_of_feedback(&self) -> NumberFormat {
-        self.format
+        NumberFormat::Single
     }
 
     fn format_of_report(&self) -> Labelling {

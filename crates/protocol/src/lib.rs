@@ -60,8 +60,6 @@ pub use handover::{Bearer, Errand, Lead, Leader};
 pub use note::Note;
 pub use payload::Payload;
 #[cfg(feature = "std")]
-pub use receiver::{
-    BoxError, Outcome, Receiver, ReceiverEvent, SensorHealth, predict_and_ask, update_asked, update_or_drop,
-};
+pub use receiver::{BoxError, Outcome, Receiver, SensorHealth, predict_and_ask, update_asked, update_or_drop};
 pub use sensor::{Feedback, Reaction, Sensor, SensorSettings, SensorTimer, Task};
 pub use slot::{SLOT_BITS, Schedule, Slot};

@@ -2,7 +2,7 @@
 
 use crate::centre::Member;
 use crate::sensor::Feedback;
-use fewbits_core::{BitString, Observation};
+use fewbits_core::{BitString, Event, Observation};
 use serde::{Deserialize, Serialize};
 
 /// Any error of an estimator.
@@ -45,8 +45,8 @@ pub trait Receiver {
         Vec::new()
     }
 
-    /// What the last update found out about sensors and model. Empty if the estimator does not judge them.
-    fn events(&self) -> Vec<ReceiverEvent> {
+    /// What the last update found out about sensors, counted from 0, and model. Empty if the estimator does not judge them.
+    fn events(&self) -> Vec<Event> {
         Vec::new()
     }
 
@@ -61,68 +61,6 @@ pub trait Receiver {
     /// # Errors
     /// If the bits are not a state of this estimator.
     fn restore(&mut self, state: &BitString) -> Result<(), BoxError>;
-}
-
-/// What an update finds out. Sensors are numbered from 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum ReceiverEvent {
-    /// The sensor is regarded as dead because of its silence.
-    Dead(usize),
-    /// A report came from a sensor that was regarded as dead.
-    Alive(usize),
-    /// The sensor's reports contradict the others' and are no longer used.
-    Excluded(usize),
-    /// An excluded sensor is used again.
-    Readmitted(usize),
-    /// The model does not hold for all sensors together.
-    Lost,
-    /// A stated noise is too large.
-    NoiseOverstated,
-    /// The estimate began anew.
-    Reacquired,
-    /// The sensor's report was not used in this slot: it is impossible, or too unlikely beside the others.
-    Rejected(usize),
-    /// The sensor contradicts another, and nothing decides which of them is wrong.
-    Disputed(usize),
-    /// A second, equal report of the sensor was dropped.
-    Copied(usize),
-    /// The estimate was widened, since most reports contradicted it.
-    Reopened,
-}
-
-impl ReceiverEvent {
-    /// The event's name, as tables contain it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Dead(_) => "dead",
-            Self::Alive(_) => "alive",
-            Self::Excluded(_) => "excluded",
-            Self::Readmitted(_) => "readmitted",
-            Self::Lost => "lost",
-            Self::NoiseOverstated => "noise overstated",
-            Self::Reacquired => "reacquired",
-            Self::Rejected(_) => "rejected",
-            Self::Disputed(_) => "disputed",
-            Self::Copied(_) => "copied",
-            Self::Reopened => "reopened",
-        }
-    }
-
-    /// The sensor; `None` if the event is about all.
-    pub fn sensor(self) -> Option<usize> {
-        match self {
-            Self::Dead(sensor)
-            | Self::Alive(sensor)
-            | Self::Excluded(sensor)
-            | Self::Readmitted(sensor)
-            | Self::Rejected(sensor)
-            | Self::Disputed(sensor)
-            | Self::Copied(sensor) => Some(sensor),
-            Self::Lost | Self::NoiseOverstated | Self::Reacquired | Self::Reopened => None,
-        }
-    }
 }
 
 /// An estimator's judgement of one sensor.
@@ -161,7 +99,7 @@ impl<R: Receiver + ?Sized> Receiver for Box<R> {
         (**self).health()
     }
 
-    fn events(&self) -> Vec<ReceiverEvent> {
+    fn events(&self) -> Vec<Event> {
         (**self).events()
     }
 

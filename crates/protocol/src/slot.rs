@@ -82,7 +82,7 @@ impl Schedule {
     }
 
     /// Length of a slot in nanoseconds.
-    pub fn period(&self) -> u64 {
+    pub(crate) fn period(&self) -> u64 {
         self.period.get()
     }
 

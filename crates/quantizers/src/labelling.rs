@@ -6,7 +6,7 @@ use fewbits_core::bits::{BitReader, BitWriter, CodecError};
 use serde::{Deserialize, Serialize};
 
 /// Largest number of bits of a word.
-pub const MAX_WORD_BITS: u32 = 16;
+pub(crate) const MAX_WORD_BITS: u32 = 16;
 
 /// An injective map from levels to words with a fixed number of bits.
 ///
@@ -135,7 +135,7 @@ impl Labelling {
     }
 
     /// Symbol of a received word; bits above the word length are ignored.
-    pub fn symbol(&self, word: u32) -> usize {
+    pub(crate) fn symbol(&self, word: u32) -> usize {
         self.symbols[word as usize & (self.symbols.len() - 1)] as usize
     }
 

@@ -6,11 +6,13 @@
 //! | successive bits about one sample beside one word | [`iterated`] |
 //! | the exact moments after a first message, by enumeration of all reports | [`tree`] |
 //! | a filter beside the exact posterior of the same bits | [`gap`] |
+//! | where the loss reaches a level; a bound of the error under losses | [`contours`] |
 //! | what a first message is worth | [`first_message`] |
 //! | a filter of its own for sign bits of vector states, one after the other or at once | [`SignFilter`] |
 //! | the published centre of identical sensors over bits | [`centre`] |
 
 pub mod centre;
+pub mod contours;
 pub mod first_message;
 pub mod gap;
 pub mod iterated;

@@ -1,7 +1,8 @@
-//! Reductions of the paper, and its bounds between divergences. The recommended reduction is
+//! Reductions of the paper, its bounds between divergences, and divergences integrated over all of space. The recommended reduction is
 //! [`Reduction::default`](fewbits_mixture_codec::Reduction::default).
 
 pub mod divergence;
+pub mod quadrature;
 
 use fewbits_densities::KernelEstimate;
 use fewbits_mixture_codec::Error;

@@ -5,8 +5,8 @@ use fewbits_baselines::mixture_codec::divergence::{
     discrete, kl_centred_normals, kl_chain_corrected, kl_chain_printed, kl_from_dr, kl_from_dr_hoeffding, kl_from_ml,
     l1_from_dr, log_largest_ratio,
 };
+use fewbits_baselines::mixture_codec::quadrature::integrated;
 use fewbits_core::Gaussian;
-use fewbits_mixture_codec::quadrature::integrated;
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::wild;
 use nalgebra::{Matrix2, Vector2};

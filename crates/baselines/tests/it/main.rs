@@ -9,3 +9,4 @@ mod common;
 mod divergences;
 mod over_bits;
 mod products;
+mod quadrature;

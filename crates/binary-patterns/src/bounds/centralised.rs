@@ -32,7 +32,7 @@ pub fn centralised_bound(source: &Source, noise_deviation: f64, sensors: usize) 
 ///
 /// # Errors
 /// If `noise_deviation` is not positive and finite, `measurements` is 0, `levels` not in `2..=4096`, or the quantizer's iteration fails.
-pub fn centralised_bound_of_levels(
+pub(crate) fn centralised_bound_of_levels(
     source: &Source,
     noise_deviation: f64,
     measurements: usize,

@@ -11,6 +11,6 @@ mod centralised;
 mod rate_distortion;
 mod van_trees;
 
-pub use centralised::{centralised_bound, centralised_bound_of_levels};
+pub use centralised::centralised_bound;
 pub use rate_distortion::{ConditionalMean, RemoteDistortion, network_rate_distortion, remote_distortion};
 pub use van_trees::optimal_weight_van_trees;

@@ -54,7 +54,7 @@ impl ConditionalMean {
     }
 
     /// `(E[X|y], Var[X|y])`: for a uniform source the moments of a normal truncated to `[-V, V]`.
-    pub fn moments(&self, y: f64) -> (f64, f64) {
+    pub(crate) fn moments(&self, y: f64) -> (f64, f64) {
         let s = self.noise_deviation;
         match self.source.kind() {
             // To first order in `v/s`; the ends of the truncation would differ only by rounding.

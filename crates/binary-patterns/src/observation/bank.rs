@@ -110,7 +110,7 @@ impl Bank {
     }
 
     /// Number of sensors.
-    pub fn sensors(&self) -> usize {
+    pub(crate) fn sensors(&self) -> usize {
         self.membership.len()
     }
 

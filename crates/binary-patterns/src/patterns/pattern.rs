@@ -84,7 +84,7 @@ impl Pattern {
     }
 
     /// The pattern over `grid` of this quantizer; `None` unless all its breakpoints are edges of the grid (to `1e-9` of its extent).
-    pub fn of(quantizer: &BinaryQuantizer, grid: &CellGrid) -> Option<Self> {
+    pub(crate) fn of(quantizer: &BinaryQuantizer, grid: &CellGrid) -> Option<Self> {
         let edges = grid.breakpoints();
         let slack = 1e-9 * edges.iter().fold(0.0, |m, e| f64::max(m, e.abs()));
         let places = quantizer

@@ -67,7 +67,7 @@ impl BinaryQuantizer {
     }
 
     /// `[ln P(0|x), ln P(1|x)]`, finite for every finite `x`.
-    pub fn log_probabilities(&self, x: f64, noise_deviation: f64) -> [f64; 2] {
+    pub(crate) fn log_probabilities(&self, x: f64, noise_deviation: f64) -> [f64; 2] {
         let mut largest = [f64::NEG_INFINITY; 2];
         self.for_cells(x, noise_deviation, |bit, low, high| {
             largest[bit] = largest[bit].max(log_interval(low, high));
@@ -82,7 +82,7 @@ impl BinaryQuantizer {
     }
 
     /// `dP(1|x)/dx`, the sum of `+-phi((t - x)/s)/s` over the breakpoints `t`.
-    pub fn slope(&self, x: f64, noise_deviation: f64) -> f64 {
+    pub(crate) fn slope(&self, x: f64, noise_deviation: f64) -> f64 {
         let mut sign = 1.0;
         let mut slope = 0.0;
         for &t in self.breakpoints() {

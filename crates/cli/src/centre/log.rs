@@ -84,7 +84,7 @@ impl Log {
                 }
                 for event in &step.events {
                     let (slot, name) = (step.slot, event.name());
-                    match event.sensor().map(|sensor| self.number(sensor)) {
+                    match event.sensor().map(|sensor| self.number(sensor as usize)) {
                         Some(number) => {
                             self.notes
                                 .say_of(name, number, &format!("slot {slot}: sensor {number} {name}"));

@@ -1,7 +1,7 @@
 //! The rows of a centre: CSV, JSON, lines of InfluxDB, or records of SenML.
 
 use crate::error::Error;
-use fewbits_core::Observation;
+use fewbits_core::{Event, Observation};
 use fewbits_link::Step;
 use fewbits_link::doors::{influx_line, senml};
 use serde_json::json;
@@ -88,7 +88,7 @@ impl Rows {
 
     /// The events as in `track`: names and numbers of sensors, separated by semicolons.
     fn events(&self, step: &Step) -> String {
-        let event = |event: &fewbits_protocol::ReceiverEvent| match event.sensor().and_then(|i| self.numbers.get(i)) {
+        let event = |event: &Event| match event.sensor().and_then(|i| self.numbers.get(i as usize)) {
             Some(number) => format!("{} {number}", event.name()),
             None => event.name().to_owned(),
         };

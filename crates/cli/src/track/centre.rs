@@ -10,7 +10,7 @@ use crate::report::Report;
 use fewbits_core::{BitString, Gaussian, Link, Message, NumberFormat, Observation, OnAxes, SensorNode};
 use fewbits_filters::calibration;
 use fewbits_filters::centre::{
-    Event, Failures, FalseAlarms, FusionCentre, NoiseLearning, ReportTest, Reporting, SensorState, Slot,
+    Failures, FalseAlarms, FusionCentre, NoiseLearning, ReportTest, Reporting, SensorState, Slot,
 };
 use fewbits_filters::smoother::{Filtered, smooth};
 use fewbits_filters::{MomentFilter, PointMassFilter, StateFilter};
@@ -284,19 +284,8 @@ impl<const D: usize, F: StateFilter<D>> Estimator for Centre<D, F> {
             slots.push(slot);
         }
         let received = self.centre.receive(&mut self.rng, &slots)?;
-        let events = received.events.into_iter().map(|event| match event {
-            Event::Dead(sensor) => ("dead", Some(sensor as usize)),
-            Event::Alive(sensor) => ("alive", Some(sensor as usize)),
-            Event::Excluded(sensor) => ("excluded", Some(sensor as usize)),
-            Event::Readmitted(sensor) => ("readmitted", Some(sensor as usize)),
-            Event::Rejected(sensor) => ("rejected", Some(sensor as usize)),
-            Event::Disputed(sensor) => ("disputed", Some(sensor as usize)),
-            Event::Copied(sensor) => ("copied", Some(sensor as usize)),
-            Event::Reopened => ("reopened", None),
-            Event::Lost => ("lost", None),
-            Event::NoiseOverstated => ("noise overstated", None),
-            _ => ("reacquired", None),
-        });
+        let events = received.events.into_iter();
+        let events = events.map(|event| (event.name(), event.sensor().map(|sensor| sensor as usize)));
         // Alarms are about values that come whatever they are, not about those that were sent because they are far from the last.
         let is_meant =
             |event: &(&'static str, Option<usize>)| !self.is_cut || !matches!(event.0, "lost" | "noise overstated");

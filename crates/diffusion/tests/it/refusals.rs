@@ -70,18 +70,10 @@ fn plans_name_line_and_column() {
 }
 
 #[test]
-fn pictures_become_plans() {
-    let text = "P1 # a room\n4 2\n1 0 0 1\n1111\n";
-    let plan = Plan::from_pbm(text).unwrap();
-    assert_eq!(plan, Plan::parse("#..#\n####").unwrap());
+fn squares_of_a_plan_are_replaced() {
+    let plan = Plan::parse("#..#\n####").unwrap();
     assert_eq!(plan.clone().with('I', [[1, 0]]).unwrap(), Plan::parse("#I.#\n####").unwrap());
     assert!(plan.clone().with('x', [[1, 0]]).is_err() && plan.with('I', [[4, 0]]).is_err());
-    let refused = Plan::from_pbm("P1 4 2 1 0 2").unwrap_err().to_string();
-    assert!(refused.contains("3 pixels: expected 4 times 2 of 0 or 1"), "{refused}");
-    for text in ["", "P4 4 2", "P1 0 2", "P1 4 x 1", "P1 4294967296 4294967296 1 0"] {
-        let refused = Plan::from_pbm(text).unwrap_err().to_string();
-        assert!(refused.contains("argument `picture`"), "{text}: {refused}");
-    }
 }
 
 #[test]

@@ -45,7 +45,7 @@ impl SearchField {
     }
 
     /// The models of the medium.
-    pub fn models(&self) -> &ModelGrid {
+    pub(crate) fn models(&self) -> &ModelGrid {
         &self.models
     }
 
@@ -55,7 +55,7 @@ impl SearchField {
     }
 
     /// Who reaches whom.
-    pub fn graph(&self) -> &Graph {
+    pub(crate) fn graph(&self) -> &Graph {
         &self.graph
     }
 }

@@ -35,7 +35,7 @@ impl SearchState {
 
     /// The records of the nodes that have sampled, under the most probable model. After [`Search::decode`] of a belief it has only the
     /// records taken since.
-    pub fn records(&self) -> &[Record] {
+    pub(crate) fn records(&self) -> &[Record] {
         &self.alternatives[most_probable(&self.alternatives)].records
     }
 
@@ -45,7 +45,7 @@ impl SearchState {
     }
 
     /// Probabilities of the models, in their order.
-    pub fn models(&self) -> Vec<f64> {
+    pub(crate) fn models(&self) -> Vec<f64> {
         self.alternatives.iter().map(|a| a.probability).collect()
     }
 }

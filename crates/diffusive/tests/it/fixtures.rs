@@ -179,9 +179,6 @@ fn mutual_information() {
     entries("mi_kt_upper")
         .iter()
         .for_each(|e| check(e, &[predictions(e).pairwise_bounds().upper]));
-    entries("mi_gauss_upper")
-        .iter()
-        .for_each(|e| check(e, &[predictions(e).gaussian_bound()]));
 }
 
 #[test]

@@ -120,12 +120,12 @@ impl MessageLaw {
     }
 
     /// The filter's correction for each message, in state units.
-    pub fn corrections(&self) -> &[f64] {
+    pub(crate) fn corrections(&self) -> &[f64] {
         &self.corrections
     }
 
     /// Probability and correction of every message when the prediction error is `error`.
-    pub fn messages(&self, error: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
+    pub(crate) fn messages(&self, error: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
         let probability = move |(log, factor): &(f64, Product)| (log + factor.log_likelihood(&[error].into())).exp();
         self.factors
             .iter()

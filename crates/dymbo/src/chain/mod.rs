@@ -26,8 +26,7 @@ mod transient;
 
 pub use law::MessageLaw;
 pub use stationary::{
-    StationaryError, coefficient_at_loss, crossover_mse, dymbo_mse, multibit_mse, noise_ratio_at_loss, parallel_mse,
-    sequential_mse, stationary, true_loss,
+    StationaryError, crossover_mse, dymbo_mse, multibit_mse, parallel_mse, sequential_mse, stationary, true_loss,
 };
 pub use transient::{TransientStep, first_message_transient};
 

@@ -87,7 +87,7 @@ pub fn sequential_mse(plant: &ScalarPlant, sensors: usize) -> Result<f64, Error>
     Ok(stationary(plant, &MessageLaw::sequence(plant, p, sensors)?)?.filtered_mse)
 }
 
-/// Exact stationary mean squared error of the Dymbo filter divided by the Kalman filter's. [`steady::loss`] approximates it.
+/// Exact stationary mean squared error of the Dymbo filter divided by the Kalman filter's. [`ScalarPlant::loss`] approximates it.
 ///
 /// # Errors
 /// As [`stationary`].
@@ -95,43 +95,9 @@ pub fn true_loss(plant: &ScalarPlant) -> Result<f64, Error> {
     Ok(dymbo_mse(&DymboFilter::new(*plant))? / plant.steady_state(1.0)?.filtered_variance)
 }
 
-/// The true loss exceeds the predicted one by at most 1.2 % for `|a| <= 1`. A level is therefore reached slightly below the predicted
-/// place, and the search starts at this share of it.
-const CLOSE: f64 = 0.9;
-
-/// The noise ratio at which [`true_loss`] reaches `level` for the given coefficient. `None` if that does not happen within 10 %
-/// below [`steady::noise_ratio_at_loss`].
-///
-/// # Errors
-/// As [`steady::noise_ratio_at_loss`] and [`stationary`].
-pub fn noise_ratio_at_loss(level: f64, coefficient: f64) -> Result<Option<f64>, Error> {
-    let Some(predicted) = steady::noise_ratio_at_loss(level, coefficient)? else {
-        return Ok(None);
-    };
-    let at = |log: f64| true_loss(&ScalarPlant::with_noise_ratio(coefficient, log.exp())?);
-    let root = steady::crossing(level, ((CLOSE * predicted).ln(), predicted.ln()), at)?;
-    Ok(root.map(f64::exp))
-}
-
-/// The coefficient at which [`true_loss`] reaches `level` for the given noise ratio. `None` if that does not happen within 10 %
-/// below [`steady::coefficient_at_loss`].
-///
-/// # Errors
-/// As [`steady::coefficient_at_loss`] and [`stationary`].
-pub fn coefficient_at_loss(level: f64, noise_ratio: f64) -> Result<Option<f64>, Error> {
-    let Some(predicted) = steady::coefficient_at_loss(level, noise_ratio)? else {
-        return Ok(None);
-    };
-    let at = |a: f64| true_loss(&ScalarPlant::with_noise_ratio(a, noise_ratio)?);
-    steady::crossing(level, (CLOSE * predicted, predicted), at)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{
-        coefficient_at_loss, crossover_mse, dymbo_mse, multibit_mse, noise_ratio_at_loss, parallel_mse, sequential_mse,
-        stationary, true_loss,
-    };
+    use super::{crossover_mse, dymbo_mse, multibit_mse, parallel_mse, sequential_mse, stationary};
     use crate::chain::{ErrorChain, MessageLaw};
     use crate::{CountFusion, DymboFilter, Error, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant};
     use fewbits_core::Link;
@@ -192,14 +158,6 @@ mod tests {
             let expected = a * a * (r + tau * tau / 12.0) + q;
             assert!((chain.predicted_mse() / expected - 1.0).abs() < 1e-6, "{} {expected}", chain.predicted_mse());
         }
-    }
-
-    #[test]
-    fn true_losses_lie_on_their_contours() {
-        let gamma = noise_ratio_at_loss(2.0, 0.95).unwrap().unwrap();
-        assert!((true_loss(&ScalarPlant::with_noise_ratio(0.95, gamma).unwrap()).unwrap() - 2.0).abs() < 1e-11);
-        assert_eq!(noise_ratio_at_loss(1.2, 1.0), Ok(None));
-        assert_eq!(coefficient_at_loss(2.0, 0.5), Ok(None));
     }
 
     #[test]

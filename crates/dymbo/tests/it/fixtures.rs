@@ -5,7 +5,7 @@
 
 use fewbits_baselines::dymbo::SignFilter;
 use fewbits_baselines::dymbo::first_message::{first_message_mse, first_message_value};
-use fewbits_baselines::dymbo::{iterated, skew_normal, tree};
+use fewbits_baselines::dymbo::{contours, iterated, skew_normal, tree};
 use fewbits_core::factor::{Factor, Levels};
 use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
 use fewbits_dymbo::chain::{self, TransientStep};
@@ -198,7 +198,7 @@ fn compute(entry: &Entry<'_>) -> Option<Vec<f64>> {
         }
         "erasure" if entry.ends("bound") => {
             let link = Link::lossy(entry.number("p_erasure")).unwrap();
-            let bound = steady::erasure_bound(&entry.plant(), &link).unwrap();
+            let bound = contours::erasure_bound(&entry.plant(), &link).unwrap();
             Some(vec![bound.filtered_variance])
         }
         _ => None,
@@ -220,7 +220,7 @@ fn steady_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
         "dymbo_filt" => dymbo.filtered_variance,
         "dymbo_pred" => dymbo.predicted_variance,
         "dymbo_gain" => DymboFilter::new(plant).steady_step().unwrap(),
-        "loss_riccati" => steady::loss(&plant).unwrap(),
+        "loss_riccati" => plant.loss().unwrap(),
         "dymbo_true_mse" => chain::dymbo_mse(&DymboFilter::new(plant)).unwrap(),
         "loss_true" => chain::true_loss(&plant).unwrap(),
         _ => return None,
@@ -230,15 +230,15 @@ fn steady_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
 fn loss_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
     let at = |a: f64, gamma: f64| ScalarPlant::with_noise_ratio(a, gamma).unwrap();
     let value = match entry.id.strip_prefix("loss.")? {
-        "max_unit_square" => steady::loss(&at(1.0, 1.0)),
-        "gamma_at_2_a1" => return steady::noise_ratio_at_loss(2.0, 1.0).unwrap().map(|g| vec![g]),
-        "gamma_at_2_a0.9" => return steady::noise_ratio_at_loss(2.0, 0.9).unwrap().map(|g| vec![g]),
-        "gamma_at_2_a0" => return steady::noise_ratio_at_loss(2.0, 0.0).unwrap().map(|g| vec![g]),
-        "a_at_2_g1" => return steady::coefficient_at_loss(2.0, 1.0).unwrap().map(|a| vec![a]),
+        "max_unit_square" => at(1.0, 1.0).loss(),
+        "gamma_at_2_a1" => return contours::noise_ratio_at_loss(2.0, 1.0).unwrap().map(|g| vec![g]),
+        "gamma_at_2_a0.9" => return contours::noise_ratio_at_loss(2.0, 0.9).unwrap().map(|g| vec![g]),
+        "gamma_at_2_a0" => return contours::noise_ratio_at_loss(2.0, 0.0).unwrap().map(|g| vec![g]),
+        "a_at_2_g1" => return contours::coefficient_at_loss(2.0, 1.0).unwrap().map(|a| vec![a]),
         // The approach to the limit is of first order in sqrt(gamma).
-        "a1_gamma_to_0" => steady::loss(&at(1.0, 1e-26)),
-        "true_gamma_at_2_a1" => return chain::noise_ratio_at_loss(2.0, 1.0).unwrap().map(|g| vec![g]),
-        "true_a_at_2_g1" => return chain::coefficient_at_loss(2.0, 1.0).unwrap().map(|a| vec![a]),
+        "a1_gamma_to_0" => at(1.0, 1e-26).loss(),
+        "true_gamma_at_2_a1" => return contours::noise_ratio_at_true_loss(2.0, 1.0).unwrap().map(|g| vec![g]),
+        "true_a_at_2_g1" => return contours::coefficient_at_true_loss(2.0, 1.0).unwrap().map(|a| vec![a]),
         "static_parameter" => {
             let after = |c: f64| (0..entry.number("n") as usize).fold(1.0, |m, _| filtered_variance(m, 1.0, c));
             Ok(after(FRAC_2_PI) / after(1.0))
@@ -254,7 +254,7 @@ fn grid_entry(entry: &Entry<'_>, loss: bool) -> Vec<f64> {
         gammas.iter().map(move |gamma| {
             let plant = ScalarPlant::with_noise_ratio(a, *gamma).unwrap();
             if loss {
-                steady::loss(&plant).unwrap()
+                plant.loss().unwrap()
             } else {
                 plant.steady_state(1.0).unwrap().filtered_variance
             }

@@ -1,6 +1,7 @@
 //! Closed forms of the steady state: limits, monotony, and the loss against the Kalman filter.
 
-use fewbits_dymbo::{ScalarPlant, chain, filtered_variance, steady};
+use fewbits_baselines::dymbo::contours;
+use fewbits_dymbo::{ScalarPlant, filtered_variance};
 use std::f64::consts::{FRAC_2_PI, PI};
 
 /// Of unit measurement noise.
@@ -15,7 +16,7 @@ fn kalman(a: f64, gamma: f64) -> f64 {
 
 /// Steady variance of the sign-bit filter over that of the Kalman filter.
 fn loss(a: f64, gamma: f64) -> f64 {
-    steady::loss(&plant(a, gamma)).unwrap()
+    plant(a, gamma).loss().unwrap()
 }
 
 fn assert_near(value: f64, expected: f64, tolerance: f64) {
@@ -65,8 +66,8 @@ fn loss_exceeds_two_in_a_corner() {
         let low = ratios(400).filter(|gamma| a <= 0.979 && *gamma <= 1.0 || *gamma <= 0.926);
         assert!(low.map(|gamma| loss(a, gamma)).all(|loss| loss < 2.0), "a = {a}");
     }
-    assert_near(steady::coefficient_at_loss(2.0, 1.0).unwrap().unwrap(), 0.979320618683, 1e-10);
-    assert_near(chain::coefficient_at_loss(2.0, 1.0).unwrap().unwrap(), 0.971111, 1e-6);
+    assert_near(contours::coefficient_at_loss(2.0, 1.0).unwrap().unwrap(), 0.979320618683, 1e-10);
+    assert_near(contours::coefficient_at_true_loss(2.0, 1.0).unwrap().unwrap(), 0.971111, 1e-6);
     let corner = (PI / 4.0 * (1.0 + (1.0 + 8.0 / PI).sqrt()) - 1.0) / ((5.0_f64.sqrt() - 1.0) / 2.0);
     assert_near(loss(1.0, 1.0), corner, 1e-12);
 }

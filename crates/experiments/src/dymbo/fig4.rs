@@ -2,7 +2,8 @@
 
 use super::common::{Plant, each, log_spaced};
 use crate::prelude::*;
-use fewbits_dymbo::{chain, steady};
+use fewbits_baselines::dymbo::contours;
+use fewbits_dymbo::chain;
 
 fn hundredths(i: i32) -> f64 {
     f64::from(i) / 100.0
@@ -53,7 +54,7 @@ impl Figure for Loss {
             let exact = p.exact_a.contains(&plant.a).then(|| chain::true_loss(&model));
             Ok::<_, Error>(Row {
                 plant: *plant,
-                loss_riccati: steady::loss(&model)?,
+                loss_riccati: model.loss()?,
                 loss_true: exact.transpose()?,
             })
         };
@@ -64,10 +65,10 @@ impl Figure for Loss {
         };
         for &level in &p.level {
             for &a in &p.a {
-                push("riccati", level, a, steady::noise_ratio_at_loss(level, a)?);
+                push("riccati", level, a, contours::noise_ratio_at_loss(level, a)?);
             }
         }
-        let exact = |a: &f64| Ok::<_, Error>((*a, chain::noise_ratio_at_loss(2.0, *a)?));
+        let exact = |a: &f64| Ok::<_, Error>((*a, contours::noise_ratio_at_true_loss(2.0, *a)?));
         for (a, gamma) in parallel::try_map(&p.exact_a, exact)? {
             push("exact", 2.0, a, gamma);
         }
@@ -97,7 +98,7 @@ impl Figure for Loss {
             // The table is too coarse for a contour that comes near a = 1 without reaching it.
             let last = line.last().map_or(1.0, |(_, a)| *a);
             let near_one = (1..12).map(|k| 1.0 - 0.01 * 0.5_f64.powi(k)).filter(|a| *a > last);
-            line.extend(near_one.filter_map(|a| Some((steady::noise_ratio_at_loss(level, a).ok()??, a))));
+            line.extend(near_one.filter_map(|a| Some((contours::noise_ratio_at_loss(level, a).ok()??, a))));
             panel = panel.with(Layer::line(level.to_string(), line).coloured(i).inline());
         }
         panel = panel.with(Layer::dashed("2, by the exact error", curve("exact", 2.0)).coloured(p.level.len()));

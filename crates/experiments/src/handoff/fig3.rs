@@ -1,9 +1,9 @@
 //! Figure 3: one bit turns a small error into the largest.
 
 use crate::prelude::*;
+use fewbits_baselines::mixture_codec::quadrature::QuadratureGrid;
 use fewbits_core::Columns;
 use fewbits_densities::{Component, Mixture};
-use fewbits_mixture_codec::quadrature::QuadratureGrid;
 
 parameters! {
     pub struct Parameters {

@@ -1,9 +1,9 @@
 //! Sign bits over bad links, and about vectors.
 
 use super::{assert_agrees, assert_agrees_if_known, exact, trials};
-use fewbits_baselines::dymbo::SignFilter;
 use fewbits_baselines::dymbo::first_message::first_message_value;
 use fewbits_baselines::dymbo::gap::{SmoothedGap, Twin, exact_filter};
+use fewbits_baselines::dymbo::{SignFilter, contours};
 use fewbits_core::factor::Levels;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Observed, Sensing, Sign};
 use fewbits_dymbo::{
@@ -62,7 +62,7 @@ fn lost_bits_cost_what_the_bound_says() {
         let runs = trials(&format!("{gamma} {loss}"), 300, |it| Ok(lossy_run(&plant, loss, it.stream)));
         let [mean, mse] = [0, 1].map(|of| runs.iter().map(|run| run[of]).collect::<Measured>());
         let [noise, mse_noise] = [mean, mse].map(|m| 4.5 * m.standard_error.unwrap());
-        let bound = steady::erasure_bound(&plant, &Link::lossy(loss).unwrap())
+        let bound = contours::erasure_bound(&plant, &Link::lossy(loss).unwrap())
             .unwrap()
             .filtered_variance;
         assert!(mean.value <= bound + noise + 1e-12, "gamma {gamma}, loss {loss}");

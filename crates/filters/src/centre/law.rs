@@ -3,10 +3,10 @@
 use super::health::Residual;
 use super::one_wrong::log_sum;
 use super::reading::{Content, Reading, Tested, WORD_BITS, conditioned, words};
-use super::{FusionCentre, Member};
+use super::{FusionCentre, Member, RemoteSensor};
 use crate::Error;
 use crate::contract::{Points, StateFilter};
-use fewbits_core::{BitString, Evidence, Gaussian, Observation};
+use fewbits_core::{BitString, Evidence, Gaussian, Likelihood, Observation};
 use nalgebra::SVector;
 
 /// What is known before the reports of an instant.
@@ -32,7 +32,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 let others = |own: usize| (0..reports.len()).filter(move |k| *k != own).map(|k| reports[k]);
                 let of = |own: usize| {
                     let weights = weighted(points, others(own));
-                    self.members[reports[own].seat].test_by_points(reports[own], points, &weights)
+                    self.members[reports[own].seat].test_by_parts(reports[own], Parts::Points(points), &weights)
                 };
                 (0..reports.len()).map(of).collect()
             }
@@ -69,7 +69,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             Law::Moments(given) => member.test(one, &conditioned(given, others)),
             Law::Points(points) => {
                 let weights = weighted(points, others.iter().copied());
-                member.test_by_points(one, points, &weights)
+                member.test_by_parts(one, Parts::Points(points), &weights)
             }
             Law::Mixture(modes) => member.test_by_mixture(one, &mixture_given(modes, others)),
         }
@@ -112,100 +112,66 @@ fn weighted<'r, 'a: 'r, const D: usize>(
     logs
 }
 
+/// A law in parts.
+#[derive(Clone, Copy)]
+enum Parts<'a, const D: usize> {
+    Points(&'a Points<D>),
+    Modes(&'a [(f64, Gaussian<D>)]),
+}
+
+impl<const D: usize> Parts<'_, D> {
+    fn len(&self) -> usize {
+        match self {
+            Self::Points(points) => points.log_weights.len(),
+            Self::Modes(modes) => modes.len(),
+        }
+    }
+
+    fn belief(&self, i: usize) -> Option<Gaussian<D>> {
+        match self {
+            Self::Points(points) => Gaussian::known(points.point(i)).ok(),
+            Self::Modes(modes) => Some(modes[i].1),
+        }
+    }
+
+    /// What a sensor measures at the mean of each part, without noise.
+    fn measured(&self, sensor: &dyn RemoteSensor<D>) -> Option<Vec<f64>> {
+        match self {
+            Self::Points(points) => (0..self.len()).map(|i| sensor.measured(&points.point(i))).collect(),
+            Self::Modes(modes) => modes.iter().map(|(_, mode)| sensor.measured(mode.mean())).collect(),
+        }
+    }
+
+    /// Of each part `ln p` of an observation, and the correction of the measurement by it: none of a point.
+    fn evidence(&self, observed: &dyn Likelihood<D>) -> Option<Vec<(f64, f64)>> {
+        match self {
+            Self::Points(points) => {
+                let mut logs = vec![0.0; self.len()];
+                observed.add_log_likelihoods(points.columns(), &mut logs);
+                Some(logs.into_iter().map(|log| (log, 0.0)).collect())
+            }
+            Self::Modes(modes) => modes.iter().map(|(_, mode)| placed(observed.evidence(mode))).collect(),
+        }
+    }
+
+    /// The beliefs of all parts, if the sensor sends a value under each.
+    fn of_values(&self, sensor: &dyn RemoteSensor<D>) -> Option<Vec<Gaussian<D>>> {
+        // What a sensor sends does not depend on the point.
+        let asked = if matches!(self, Self::Points(_)) { 1 } else { self.len() };
+        for i in 0..asked {
+            sensor.value_variance(&self.belief(i)?)?;
+        }
+        (0..self.len()).map(|i| self.belief(i)).collect()
+    }
+}
+
 impl<const D: usize> Member<D> {
-    fn test_by_points(&self, reading: &Reading<'_, D>, points: &Points<D>, log_weights: &[f64]) -> Tested {
-        let impossible = Tested {
-            is_possible: false,
-            residual: None,
-        };
-        let Some(known) = reading.known() else {
-            return impossible;
-        };
-        let mut logs = vec![0.0; log_weights.len()];
-        known.add_log_likelihoods(points.columns(), &mut logs);
-        let total = log_sum(log_weights.iter().copied());
-        let joint = log_weights.iter().zip(&logs).map(|(weight, log)| weight + log);
-        let evidence = log_sum(joint) - total;
-        if !evidence.is_finite() {
-            return impossible;
-        }
-        let weights: Vec<f64> = log_weights.iter().map(|log| (log - total).exp()).collect();
-        let measured: Option<Vec<f64>> = (0..weights.len())
-            .map(|i| self.sensor.measured(&points.point(i)))
-            .collect();
-        let residual = match (&reading.slot.observation, measured) {
-            (Observation::Received(bits), Some(measured)) if reading.content == Content::Report => {
-                self.residual_by_points(reading, bits.bits(), points, &weights, &measured, &logs)
-            }
-            _ => None,
-        };
-        Tested {
-            is_possible: true,
-            residual,
-        }
-    }
-
-    fn residual_by_points(
-        &self,
-        reading: &Reading<'_, D>,
-        bits: usize,
-        points: &Points<D>,
-        weights: &[f64],
-        measured: &[f64],
-        logs: &[f64],
-    ) -> Option<Residual> {
-        // `p` of an observation and the correction of the measurement by it.
-        let place = |logs: &[f64]| {
-            let sums =
-                weights
-                    .iter()
-                    .zip(logs)
-                    .zip(measured)
-                    .fold((0.0, 0.0, 0.0), |(p, with, mean), ((w, log), h)| {
-                        let joint = w * log.exp();
-                        (p + joint, with + joint * h, mean + w * h)
-                    });
-            (sums.0.ln(), sums.1 / sums.0 - sums.2)
-        };
-        if bits == 1 && self.always_speaks {
-            let (log, correction) = place(logs);
-            return Residual::of_bit((log.exp() / self.arrival).min(1.0), correction);
-        }
-        let known = |i: usize| Gaussian::known(points.point(i)).ok();
-        if self.sensor.value_variance(&known(0)?).is_some() {
-            let beliefs: Vec<Gaussian<D>> = (0..weights.len()).map(known).collect::<Option<_>>()?;
-            return self.residual_of_report(reading, &beliefs, weights, measured, (logs, measured));
-        }
-        if bits == 0 || bits > WORD_BITS {
-            return None;
-        }
-        let Observation::Received(received) = &reading.slot.observation else {
-            return None;
-        };
-        let (mut found, mut at, mut alternative) = (Vec::new(), 0, reading.slot.clone());
-        for word in words(bits) {
-            let is_received = word == *received;
-            if !self.sensor.decodes(&word) {
-                continue;
-            }
-            alternative.observation = Observation::Received(word);
-            let Ok(likelihood) = self.sensor.likelihood(&alternative, 1.0) else {
-                continue;
-            };
-            let mut own = vec![0.0; weights.len()];
-            likelihood.add_log_likelihoods(points.columns(), &mut own);
-            let (log, correction) = place(&own);
-            if is_received {
-                at = found.len();
-            }
-            if log.is_finite() {
-                found.push((log, correction));
-            }
-        }
-        Residual::of_word(&found, at)
-    }
-
     fn test_by_mixture(&self, reading: &Reading<'_, D>, modes: &[(f64, Gaussian<D>)]) -> Tested {
+        let log_weights: Vec<f64> = modes.iter().map(|(log, _)| *log).collect();
+        self.test_by_parts(reading, Parts::Modes(modes), &log_weights)
+    }
+
+    fn test_by_parts(&self, reading: &Reading<'_, D>, parts: Parts<'_, D>, log_weights: &[f64]) -> Tested {
         let untested = |is_possible| Tested {
             is_possible,
             residual: None,
@@ -213,18 +179,19 @@ impl<const D: usize> Member<D> {
         let Some(known) = reading.known() else {
             return untested(false);
         };
-        let found: Option<Vec<(f64, f64)>> = modes.iter().map(|(_, mode)| placed(known.evidence(mode))).collect();
         // An observation that cannot update a belief may still have a probability.
-        let Some(found) = found else { return untested(true) };
-        let total = log_sum(modes.iter().map(|(log, _)| *log));
-        let joint = modes.iter().zip(&found).map(|((weight, _), (log, _))| weight + log);
+        let Some(found) = parts.evidence(known) else {
+            return untested(true);
+        };
+        let total = log_sum(log_weights.iter().copied());
+        let joint = log_weights.iter().zip(&found).map(|(weight, (log, _))| weight + log);
         if !(log_sum(joint) - total).is_finite() {
             return untested(false);
         }
-        let weights: Vec<f64> = modes.iter().map(|(log, _)| (log - total).exp()).collect();
+        let weights: Vec<f64> = log_weights.iter().map(|log| (log - total).exp()).collect();
         let residual = match &reading.slot.observation {
             Observation::Received(bits) if reading.content == Content::Report => {
-                self.residual_by_mixture(reading, bits, modes, &weights, &found)
+                self.residual_by_parts(reading, bits, parts, &weights, &found)
             }
             _ => None,
         };
@@ -234,16 +201,15 @@ impl<const D: usize> Member<D> {
         }
     }
 
-    fn residual_by_mixture(
+    fn residual_by_parts(
         &self,
         reading: &Reading<'_, D>,
         received: &BitString,
-        modes: &[(f64, Gaussian<D>)],
+        parts: Parts<'_, D>,
         weights: &[f64],
         found: &[(f64, f64)],
     ) -> Option<Residual> {
-        let measured = modes.iter().map(|(_, mode)| self.sensor.measured(mode.mean()));
-        let measured: Vec<f64> = measured.collect::<Option<_>>()?;
+        let measured = parts.measured(&*self.sensor)?;
         // `p` of an observation and the correction of the measurement by it.
         let place = |found: &[(f64, f64)]| {
             let all = weights.iter().zip(found).zip(&measured);
@@ -257,14 +223,12 @@ impl<const D: usize> Member<D> {
             let (log, correction) = place(found);
             return Residual::of_bit((log.exp() / self.arrival).min(1.0), correction);
         }
-        if modes.iter().all(|(_, mode)| self.sensor.value_variance(mode).is_some()) {
-            let logs: Vec<f64> = found.iter().map(|(log, _)| *log).collect();
-            let after: Vec<f64> = measured
+        if let Some(beliefs) = parts.of_values(&*self.sensor) {
+            let (logs, after): (Vec<f64>, Vec<f64>) = found
                 .iter()
-                .zip(found)
-                .map(|(h, (_, correction))| h + correction)
-                .collect();
-            let beliefs: Vec<Gaussian<D>> = modes.iter().map(|(_, mode)| *mode).collect();
+                .zip(&measured)
+                .map(|((log, correction), h)| (*log, h + correction))
+                .unzip();
             return self.residual_of_report(reading, &beliefs, weights, &measured, (&logs, &after));
         }
         if received.bits() == 0 || received.bits() > WORD_BITS {
@@ -277,11 +241,10 @@ impl<const D: usize> Member<D> {
                 continue;
             }
             alternative.observation = Observation::Received(word);
-            let own: Option<Vec<_>> = modes
-                .iter()
-                .map(|(_, mode)| placed(self.sensor.evidence(&alternative, 1.0, mode)))
-                .collect();
-            let Some(own) = own else { continue };
+            let likelihood = self.sensor.likelihood(&alternative, 1.0).ok();
+            let Some(own) = likelihood.and_then(|likelihood| parts.evidence(&*likelihood)) else {
+                continue;
+            };
             let (log, correction) = place(&own);
             if is_received {
                 at = all.len();

@@ -41,11 +41,12 @@ mod state;
 mod together;
 mod window;
 
+pub use fewbits_core::Event;
 pub use health::{FalseAlarms, Health};
 pub use learning::NoiseLearning;
 pub use presence::Failures;
 pub use remote::{RemoteSensor, ReportTest, Reporting};
-pub use slot::{Event, Received, SensorState, Slot};
+pub use slot::{Received, SensorState, Slot};
 pub use state::CentreState;
 
 use crate::Error;

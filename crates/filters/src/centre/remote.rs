@@ -153,16 +153,6 @@ impl<S, C, A, const M: usize> Reporting<S, C, A, M> {
             ..self
         }
     }
-
-    /// The scheme.
-    pub fn scheme(&self) -> &C {
-        &self.scheme
-    }
-
-    /// The sensing model.
-    pub fn sensing(&self) -> &S {
-        &self.sensing
-    }
 }
 
 impl<S, const D: usize> Reporting<S, fewbits_core::FullValue, fn(&Gaussian<D>, &Gaussian<1>), 1> {

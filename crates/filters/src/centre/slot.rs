@@ -1,7 +1,7 @@
 //! Input and output types of a fusion centre.
 
 use crate::contract::Info;
-use fewbits_core::{BitString, Observation};
+use fewbits_core::{BitString, Event, Observation};
 
 /// The observation of one sensor in one slot, with the feedback that the sensor was told. A sensor that was not asked has no slot.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,69 +21,6 @@ impl Slot {
             sensor,
             feedback,
             observation,
-        }
-    }
-}
-
-/// An event that the centre reports to its caller.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Event {
-    /// The sensor with this number is declared dead because of its silence, which carries no information from now on.
-    Dead(u32),
-    /// A report came from a sensor that had been declared dead.
-    Alive(u32),
-    /// The reports of this sensor contradict the others'. They are no longer used, but still tested.
-    Excluded(u32),
-    /// An excluded sensor has agreed with the others for long enough and is used again.
-    Readmitted(u32),
-    /// The model does not hold for all sensors together: observations are too unlikely, or residuals repeat. The track is lost, or a stated
-    /// noise is too small.
-    Lost,
-    /// Observations are likelier than predicted, or residuals alternate: a stated noise is too large.
-    NoiseOverstated,
-    /// The report of this sensor was not used at this instant: it is impossible, or too unlikely given the prediction and the others'
-    /// reports.
-    Rejected(u32),
-    /// This sensor contradicts another, and nothing decides which of them is wrong. The belief covers what either says.
-    Disputed(u32),
-    /// A second, equal report of this sensor at the same instant was dropped.
-    Copied(u32),
-    /// Most reports did not agree with the prediction, but with each other, or again and again. The belief was replaced by a wider one.
-    Reopened,
-    /// The belief was replaced by the prior of [`FusionCentre::reacquire_from`](super::FusionCentre::reacquire_from).
-    Reacquired,
-}
-
-impl Event {
-    /// The name of this kind of event, in lower case.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Dead(_) => "dead",
-            Self::Alive(_) => "alive",
-            Self::Excluded(_) => "excluded",
-            Self::Readmitted(_) => "readmitted",
-            Self::Lost => "lost",
-            Self::NoiseOverstated => "noise overstated",
-            Self::Rejected(_) => "rejected",
-            Self::Disputed(_) => "disputed",
-            Self::Copied(_) => "copied",
-            Self::Reopened => "reopened",
-            Self::Reacquired => "reacquired",
-        }
-    }
-
-    /// The number of the sensor that it is about; `None` if it is about the whole centre.
-    pub fn sensor(&self) -> Option<u32> {
-        match self {
-            Self::Dead(sensor)
-            | Self::Alive(sensor)
-            | Self::Excluded(sensor)
-            | Self::Readmitted(sensor)
-            | Self::Rejected(sensor)
-            | Self::Disputed(sensor)
-            | Self::Copied(sensor) => Some(*sensor),
-            Self::Lost | Self::NoiseOverstated | Self::Reopened | Self::Reacquired => None,
         }
     }
 }

@@ -284,7 +284,7 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
         for event in &step.events {
             let sensor = event
                 .sensor()
-                .and_then(|sensor| self.remotes.get(sensor))
+                .and_then(|sensor| self.remotes.get(sensor as usize))
                 .map(|remote| remote.number);
             tracing::info!(slot, sensor, "{}", event.name());
         }

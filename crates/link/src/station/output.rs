@@ -1,8 +1,8 @@
 //! What a station is given and what it returns.
 
 use crate::envelope::{Key, Refusal};
-use fewbits_core::{BitString, Observation};
-use fewbits_protocol::{Note, ReceiverEvent, SensorHealth};
+use fewbits_core::{BitString, Event, Observation};
+use fewbits_protocol::{Note, SensorHealth};
 use serde::{Deserialize, Serialize};
 use std::net::SocketAddr;
 
@@ -35,9 +35,9 @@ pub struct Step {
     /// The estimator's judgement of each sensor after the slot; empty if it does not judge them.
     #[serde(default)]
     pub health: Vec<SensorHealth>,
-    /// What the update found out about sensors and model.
+    /// What the update found out about sensors, counted from 0, and model.
     #[serde(default)]
-    pub events: Vec<ReceiverEvent>,
+    pub events: Vec<Event>,
 }
 
 impl Step {

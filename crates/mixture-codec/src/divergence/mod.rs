@@ -17,7 +17,6 @@
 //! finitely many points are called `*_plugin`: they are estimates, not bounds.
 
 pub mod plug_in;
-pub mod quadrature;
 
 use serde::{Deserialize, Serialize};
 

@@ -26,7 +26,7 @@ pub struct PlugIn {
 
 impl PlugIn {
     /// The estimates from pairs of weight and log ratio; the weights must sum to one.
-    pub fn of(ratios: impl Iterator<Item = (f64, f64)>) -> Self {
+    pub(crate) fn of(ratios: impl Iterator<Item = (f64, f64)>) -> Self {
         let (mut top, mut bottom) = (f64::NEG_INFINITY, f64::INFINITY);
         let mut estimate = Self::default();
         for (w, f) in ratios {

@@ -45,7 +45,7 @@ use walk::{Decoder, Quantiser, walk};
 /// Version of the format. Every change of the encoding gets a new number and an entry in the changelog.
 pub const FORMAT: u32 = 1;
 /// Largest number of components of a message.
-pub const MAX_COMPONENTS: usize = 63;
+pub(crate) const MAX_COMPONENTS: usize = 63;
 
 /// A quantised mixture as a message. It equals what the receiver decodes, to the last bit.
 ///

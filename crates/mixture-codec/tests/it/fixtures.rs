@@ -2,11 +2,11 @@
 
 use crate::common::d1;
 use fewbits_baselines::mixture_codec::divergence::{self, discrete, kl_centred_normals};
+use fewbits_baselines::mixture_codec::quadrature::{QuadratureGrid, integrated};
 use fewbits_densities::{Component, KernelEstimate, Mixture, Particles};
 use fewbits_mixture_codec::cut::{greedy, optimal};
 use fewbits_mixture_codec::merge::{MergeCost, merge};
 use fewbits_mixture_codec::plug_in::{node_errors, plug_in};
-use fewbits_mixture_codec::quadrature::{QuadratureGrid, integrated};
 use fewbits_mixture_codec::{Criterion, Cubature, NodeErrors, Split, Tree, refine};
 use nalgebra::{Matrix1, Vector1};
 use serde_json::Value;

@@ -8,7 +8,6 @@ mod clumps;
 mod common;
 mod fixtures;
 mod merging;
-mod quadrature;
 mod reduction;
 mod wild;
 mod wire;

@@ -1,11 +1,11 @@
 //! Reductions: optimality of cuts, conserved moments, units, bad input.
 
 use crate::common::{crescent, d1_scaled, random_mixture};
+use fewbits_baselines::mixture_codec::quadrature::integrated;
 use fewbits_densities::{Bandwidth, Component, KernelEstimate, Mixture, Particles};
 use fewbits_mixture_codec::cut::{greedy, greedy_within, optimal};
 use fewbits_mixture_codec::merge::{MergeCost, merge};
 use fewbits_mixture_codec::plug_in::{cubature, node_errors, plug_in};
-use fewbits_mixture_codec::quadrature::integrated;
 use fewbits_mixture_codec::tree::{At, Axis};
 use fewbits_mixture_codec::{Criterion, Cubature, NodeErrors, PlugIn, Reduction, Split, Tree, refine};
 use fewbits_monte_carlo::Stream;

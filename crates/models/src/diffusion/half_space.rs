@@ -39,7 +39,7 @@ impl Wall {
     }
 
     /// Loss velocity, m/s.
-    pub fn loss(&self) -> f64 {
+    pub(crate) fn loss(&self) -> f64 {
         self.loss
     }
 }

@@ -175,7 +175,7 @@ impl Field {
     ///
     /// # Errors
     /// [`Error::UnknownNode`]; [`Error::Disconnected`] if a node cannot be reached.
-    pub fn routes(&self, root: SensorId) -> Result<Hops, Error> {
+    pub(crate) fn routes(&self, root: SensorId) -> Result<Hops, Error> {
         let hops = self.graph.hops_from(root.index())?;
         let (reached, nodes) = (hops.reached().len(), self.len());
         if reached < nodes {

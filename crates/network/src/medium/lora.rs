@@ -13,7 +13,7 @@ const SLOW_SYMBOL: f64 = 0.016;
 /// Application payload that LoRaWAN allows in Europe at each spreading factor from 7 to 12, bytes (RP002-1.0.3, table 8, without options).
 const EU868_PAYLOAD: [u64; 6] = [242, 242, 115, 51, 51, 51];
 /// Bytes around the application payload of a LoRaWAN frame: header, address, control, counter, port, integrity code.
-pub const LORAWAN_OVERHEAD: Bits = Bits(13 * 8);
+pub(crate) const LORAWAN_OVERHEAD: Bits = Bits(13 * 8);
 
 /// Modulation of a LoRa frame with explicit header and checksum.
 ///
@@ -68,7 +68,7 @@ impl Lora {
     }
 
     /// Duration of a symbol.
-    pub fn symbol(&self) -> Seconds {
+    pub(crate) fn symbol(&self) -> Seconds {
         Seconds::trusted(f64::from(1_u32 << self.spreading) / self.bandwidth)
     }
 
@@ -85,17 +85,8 @@ impl Lora {
     }
 
     /// Largest application payload of a LoRaWAN frame in Europe (EU868).
-    pub fn max_payload(&self) -> Bits {
+    pub(crate) fn max_payload(&self) -> Bits {
         Bits(8 * EU868_PAYLOAD[(self.spreading - 7) as usize])
-    }
-
-    /// Time that a sender must be silent after a frame of this duration, so that it sends no more than `share` of the time: 0.01 in most
-    /// bands of EU868.
-    ///
-    /// # Errors
-    /// If `share` is not above 0 and at most 1.
-    pub fn pause(on_air: Seconds, share: f64) -> Result<Seconds, ArgumentError> {
-        Seconds::new(on_air.value() / checked_share(share)? - on_air.value())
     }
 }
 
@@ -126,14 +117,5 @@ mod tests {
             }
         }
         assert!(Lora::new(6, 125e3).is_err() && Lora::new(7, 100e3).is_err());
-    }
-
-    #[test]
-    fn duty_cycle_is_kept() {
-        let on_air = Lora::new(12, 125e3).unwrap().time_on_air(64);
-        let pause = Lora::pause(on_air, 0.01).unwrap();
-        assert!((on_air.value() / (on_air.value() + pause.value()) - 0.01).abs() < 1e-12);
-        assert_eq!(Lora::pause(on_air, 1.0).unwrap(), Seconds::ZERO);
-        assert!(Lora::pause(on_air, 0.0).is_err());
     }
 }

@@ -111,7 +111,7 @@ impl Loss {
     }
 
     /// Probability that a frame over `distance` metres is lost. For bursts it is the average over both states.
-    pub fn probability(&self, distance: f64) -> f64 {
+    pub(crate) fn probability(&self, distance: f64) -> f64 {
         match *self {
             Self::Burst {
                 good,

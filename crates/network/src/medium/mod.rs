@@ -11,6 +11,6 @@ pub(crate) mod radio;
 pub use air::on_air;
 pub use channel::{Channel, ReceivedCopy};
 pub use field::Field;
-pub use lora::{LORAWAN_OVERHEAD, Lora};
+pub use lora::Lora;
 pub use loss::Loss;
-pub use radio::{CC2420_OUTPUT, FRAGMENT_OVERHEAD, Radio, TWO_AA_CELLS, Transceiver};
+pub use radio::{Radio, TWO_AA_CELLS, Transceiver};

@@ -78,13 +78,13 @@ pub struct Radio {
 }
 
 /// Overhead of each part of a frame that needs several link frames: a fragment header (40 bits, RFC 4944, section 5.3) and the frame check of IEEE 802.15.4 (16 bits).
-pub const FRAGMENT_OVERHEAD: Bits = Bits(56);
+pub(crate) const FRAGMENT_OVERHEAD: Bits = Bits(56);
 
 /// Energy of two AA cells.
 pub const TWO_AA_CELLS: Joules = Joules::trusted(18_720.0);
 
 /// Output powers of the CC2420 in dBm, each with the power consumption while sending, mW: the currents of the data sheet (17.4 mA at 0 dBm, 8.5 mA at -25 dBm) at 3.3 V.
-pub const CC2420_OUTPUT: [(f64, f64); 8] = [
+pub(crate) const CC2420_OUTPUT: [(f64, f64); 8] = [
     (0.0, 57.42),
     (-1.0, 54.45),
     (-3.0, 50.16),
@@ -96,7 +96,7 @@ pub const CC2420_OUTPUT: [(f64, f64); 8] = [
 ];
 
 impl Radio {
-    /// The CC2420 with two AA cells, at an output power of [`CC2420_OUTPUT`].
+    /// The CC2420 with two AA cells, at one of the eight output powers of its data sheet, in dBm.
     ///
     /// # Errors
     /// If `output_dbm` is none of the eight.

@@ -5,7 +5,7 @@ use super::queue::EventKind;
 use crate::error::{Cause, Error};
 use crate::medium::Field;
 use crate::note::Note;
-use crate::units::{Instant, Seconds, SensorId};
+use crate::units::{Instant, SensorId};
 use fewbits_protocol::Frame;
 use serde::{Serialize, de::DeserializeOwned};
 
@@ -119,11 +119,6 @@ impl<'a> Context<'a> {
         self.core.schedule(time, self.node, EventKind::Timer(token));
     }
 
-    /// Sets a timer that fires after `duration`.
-    pub fn after(&mut self, duration: Seconds, token: u32) {
-        self.at(self.now().after(duration), token);
-    }
-
     /// Sends to a neighbour, possibly later in a batch. With acknowledgements, [`Protocol::on_ack`] or
     /// [`Protocol::on_give_up`] is called later with the returned ticket.
     ///
@@ -138,7 +133,7 @@ impl<'a> Context<'a> {
     ///
     /// # Errors
     /// As [`Context::send`].
-    pub fn send_now(&mut self, to: SensorId, frame: &Frame<'_>) -> Result<Ticket, Error> {
+    pub(crate) fn send_now(&mut self, to: SensorId, frame: &Frame<'_>) -> Result<Ticket, Error> {
         self.core.field.check_link(self.node, to)?;
         Ok(self.core.send(self.node, Some(to), frame))
     }
@@ -149,7 +144,7 @@ impl<'a> Context<'a> {
     }
 
     /// Whether frames to a single receiver are acknowledged.
-    pub fn has_acknowledgements(&self) -> bool {
+    pub(crate) fn has_acknowledgements(&self) -> bool {
         self.core.setup.retries.is_some()
     }
 

@@ -34,7 +34,7 @@ impl Account {
     }
 
     /// Total energy until `now`: sending, receiving and idle.
-    pub fn total(&self, radio: &Radio, now: Instant) -> Joules {
+    pub(crate) fn total(&self, radio: &Radio, now: Instant) -> Joules {
         self.sending + self.receiving + self.idle(radio, now)
     }
 }

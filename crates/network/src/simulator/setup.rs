@@ -157,7 +157,7 @@ impl Setup {
 
     /// The radio of a node.
     #[inline]
-    pub fn radio_of(&self, node: SensorId) -> &Radio {
+    pub(crate) fn radio_of(&self, node: SensorId) -> &Radio {
         if self.radios.is_empty() {
             return &self.radio;
         }
@@ -166,7 +166,7 @@ impl Setup {
 
     /// Loss from one node to another.
     #[inline]
-    pub fn loss_of(&self, from: SensorId, to: SensorId) -> &Loss {
+    pub(crate) fn loss_of(&self, from: SensorId, to: SensorId) -> &Loss {
         if self.link_loss.is_empty() {
             return &self.channel.loss;
         }

@@ -67,7 +67,7 @@ impl Bank {
     }
 
     /// The model of the largest weight, the first of equals.
-    pub fn best(&self) -> usize {
+    pub(crate) fn best(&self) -> usize {
         let mut best = (0, self.w[0]);
         for (m, w) in self.w.iter().enumerate() {
             if *w > best.1 {
@@ -78,7 +78,7 @@ impl Bank {
     }
 
     /// Whether stored numbers can be those of a bank.
-    pub fn is_valid(&self) -> bool {
+    pub(crate) fn is_valid(&self) -> bool {
         let finite = self.x.iter().chain(&self.v).all(|x| x.abs() < 1e30);
         finite && self.w.iter().all(|w| *w > 0.0 && *w < 1.0 + 1e-9)
     }

@@ -30,12 +30,12 @@ impl Residuals {
     };
 
     /// Counts of the residuals from -64 to 64, and the number of all residuals.
-    pub fn to_counts(&self) -> (&[u16], u32) {
+    pub(crate) fn to_counts(&self) -> (&[u16], u32) {
         (&self.counts, self.total)
     }
 
     /// The inverse of [`to_counts`](Self::to_counts); `None` if the numbers cannot be its result.
-    pub fn from_counts(counts: &[u16], total: u32) -> Option<Self> {
+    pub(crate) fn from_counts(counts: &[u16], total: u32) -> Option<Self> {
         let sum: u32 = counts.iter().map(|c| u32::from(*c)).sum();
         let counts = counts.try_into().ok()?;
         (total <= MOST && sum <= total).then_some(Self { counts, total })
@@ -55,14 +55,14 @@ impl Residuals {
     }
 
     /// Probability of `k` among the residuals that are not zero.
-    pub fn probability(&self, k: i64) -> f32 {
+    pub(crate) fn probability(&self, k: i64) -> f32 {
         let at = usize::try_from(k + WINDOW).ok();
         let count = at.and_then(|at| self.counts.get(at)).copied().unwrap_or(0);
         (f32::from(count) + 0.5 * PRIOR * half_to(k.abs().min(60))) * self.scale()
     }
 
     /// Probability of residuals below `k`.
-    pub fn below(&self, k: i64) -> f32 {
+    pub(crate) fn below(&self, k: i64) -> f32 {
         let counted = (k + WINDOW).clamp(0, COUNTS as i64) as usize;
         let count: u32 = self.counts.iter().take(counted).map(|c| u32::from(*c)).sum();
         let prior = if k <= 0 { half_to(1 - k) } else { 1.0 - half_to(k) };
@@ -82,9 +82,9 @@ impl Residuals {
 }
 
 /// Largest number of remembered indices.
-pub const CAPACITY: usize = 240;
+pub(crate) const CAPACITY: usize = 240;
 /// Weight of a reported index; that of a silent slot has weight one.
-pub const REPORTED: u32 = 10;
+pub(crate) const REPORTED: u32 = 10;
 /// Total at which all counts are halved.
 const MOST_SEEN: u32 = 1 << 22;
 
@@ -130,14 +130,14 @@ impl Values {
     };
 
     /// Indices with their counts, in increasing order.
-    pub fn iter(&self) -> impl Iterator<Item = (i64, u32)> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (i64, u32)> {
         let index = |entry: u64| (entry >> COUNT_BITS) as i64 + LOWEST;
         self.stored().iter().map(move |entry| (index(*entry), count_of(*entry)))
     }
 
     /// The inverse of [`iter`](Self::iter). `None` unless there are at most 240 increasing indices with counts above zero and not too
     /// large.
-    pub fn from_counts(counts: impl IntoIterator<Item = (i64, u32)>) -> Option<Self> {
+    pub(crate) fn from_counts(counts: impl IntoIterator<Item = (i64, u32)>) -> Option<Self> {
         let mut values = Self::NONE;
         let mut before = None;
         for (index, count) in counts {
@@ -162,7 +162,7 @@ impl Values {
     }
 
     /// The sum of all counts.
-    pub fn total(&self) -> u32 {
+    pub(crate) fn total(&self) -> u32 {
         self.total
     }
 
@@ -176,7 +176,7 @@ impl Values {
     }
 
     /// How often an index occurred.
-    pub fn count(&self, j: i64) -> u32 {
+    pub(crate) fn count(&self, j: i64) -> u32 {
         match self.stored().get(self.rank(j)) {
             Some(entry) if (entry ^ entry_of(j)) >> COUNT_BITS == 0 => count_of(*entry),
             _ => 0,
@@ -184,7 +184,7 @@ impl Values {
     }
 
     /// Counts of the indices in `first..end`.
-    pub fn between(&self, first: i64, end: i64) -> u32 {
+    pub(crate) fn between(&self, first: i64, end: i64) -> u32 {
         let chosen = self.stored().get(self.rank(first)..self.rank(end));
         let entries = chosen.unwrap_or(&[]);
         vectorised(

@@ -242,7 +242,7 @@ pub fn next_sequence(config: &Config, sequence: u32) -> u32 {
 }
 
 /// The beginning of a packet: counter and refresh flag if the configuration is resilient, otherwise nothing.
-pub fn header(config: &Config, sequence: u32, refresh: bool) -> Packet {
+pub(crate) fn header(config: &Config, sequence: u32, refresh: bool) -> Packet {
     let mut packet = Packet::default();
     if config.is_resilient() {
         packet.push(u64::from(sequence), config.sequence_bits());

@@ -95,17 +95,17 @@ impl Lattice {
     }
 
     /// Number of points on the circle, if there is one.
-    pub fn cells(&self) -> Option<i64> {
+    pub(crate) fn cells(&self) -> Option<i64> {
         self.circle.map(|(_, cells)| cells)
     }
 
     /// The unique index of a point: `0..cells` on a circle.
-    pub fn canonical(&self, j: i64) -> i64 {
+    pub(crate) fn canonical(&self, j: i64) -> i64 {
         self.cells().map_or(j, |cells| j.checked_rem_euclid(cells).unwrap_or(0))
     }
 
     /// The reconstruction of an index.
-    pub fn value(&self, j: i64) -> f64 {
+    pub(crate) fn value(&self, j: i64) -> f64 {
         let value = match &self.decimal {
             Some(decimal) => decimal.value(j),
             None => self.anchor + self.step * self.canonical(j) as f64,
@@ -116,7 +116,7 @@ impl Lattice {
     }
 
     /// A difference of indices; on a circle the shorter way.
-    pub fn shortest(&self, difference: i64) -> i64 {
+    pub(crate) fn shortest(&self, difference: i64) -> i64 {
         self.cells().map_or(difference, |cells| {
             let k = difference.checked_rem_euclid(cells).unwrap_or(0);
             if 2 * k > cells { k - cells } else { k }
@@ -125,7 +125,7 @@ impl Lattice {
 
     /// The index nearest to a sample; on a circle, of its equivalent indices the one nearest to `near`. `None` if no point of the
     /// lattice is within `delta` of it or its index is too large.
-    pub fn index(&self, sample: f64, near: i64) -> Option<i64> {
+    pub(crate) fn index(&self, sample: f64, near: i64) -> Option<i64> {
         let offset = (sample - self.anchor) / self.step;
         if !offset.is_finite() || offset.abs() >= LARGEST as f64 {
             return None;
@@ -144,7 +144,7 @@ impl Lattice {
     }
 
     /// Whether stored numbers can be those of a lattice of this configuration.
-    pub fn is_valid(&self, config: &Config) -> bool {
+    pub(crate) fn is_valid(&self, config: &Config) -> bool {
         let agreed = self.delta == config.delta() && self.circle.map(|circle| circle.0) == config.period();
         let numbers = [self.anchor, self.step].iter().all(|x| x.is_finite());
         let decimal = self.decimal.is_none_or(|d| d.step > 0 && TENS.contains(&d.ten));

@@ -56,16 +56,11 @@ pub struct Slot {
     pub(super) prediction: i64,
 }
 
-impl Slot {
-    /// The predicted index, which silence stands for.
-    pub fn prediction(&self) -> i64 {
-        self.prediction
-    }
-}
+impl Slot {}
 
 impl Replica {
     /// All zeros: memory before the first sample. [`restart`](Self::restart) makes it a replica.
-    pub const UNSET: Self = Self {
+    pub(crate) const UNSET: Self = Self {
         lattice: Lattice::UNSET,
         bank: Bank::UNSET,
         last: 0,
@@ -101,11 +96,6 @@ impl Replica {
     /// Replaces the bank by an earlier copy, which undoes [`predict`](Self::predict).
     pub fn restore_bank(&mut self, saved: Bank) {
         self.bank = saved;
-    }
-
-    /// The lattice of reconstructions.
-    pub fn lattice(&self) -> &Lattice {
-        &self.lattice
     }
 
     /// The reconstruction of the last slot.

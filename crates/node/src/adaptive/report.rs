@@ -27,7 +27,7 @@ impl Content {
     pub const LENGTH: u32 = 6;
 
     /// The content of the report of a sample; `None` for silence.
-    pub fn of(replica: &Replica, slot: &Slot, sample: f64) -> Option<Self> {
+    pub(crate) fn of(replica: &Replica, slot: &Slot, sample: f64) -> Option<Self> {
         match replica.lattice.index(sample, slot.prediction) {
             None => Some(Self::Whole(sample)),
             Some(j) => match j - slot.prediction {
@@ -88,7 +88,7 @@ impl Content {
     }
 
     /// The word of its symbol: value and length. The word of a near residual ends the packet.
-    pub fn word(&self, place: &Place) -> (u32, u32) {
+    pub(crate) fn word(&self, place: &Place) -> (u32, u32) {
         match self {
             Self::Near(_) => place.last_word(),
             Self::Far(_) | Self::Whole(_) => place.word(),
@@ -97,7 +97,7 @@ impl Content {
 }
 
 /// Appends a report. Returns the interval of its symbol, and the number of bits that follow the symbol uncoded.
-pub fn push(content: &Content, law: &Law<'_>, packet: &mut Packet) -> (Place, u32) {
+pub(crate) fn push(content: &Content, law: &Law<'_>, packet: &mut Packet) -> (Place, u32) {
     let place = content.place(law);
     let (value, bits) = content.word(&place);
     packet.push(u64::from(value), bits);

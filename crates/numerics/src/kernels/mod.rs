@@ -81,16 +81,6 @@ pub fn vectorised<R>(work: impl FnOnce() -> R) -> R {
     }
 }
 
-/// As [`vectorised`], with registers of 256 bits at most: for loops over few numbers at a time, which wider registers slow down.
-#[inline(always)]
-pub fn vectorised_narrow<R>(work: impl FnOnce() -> R) -> R {
-    #[cfg(all(feature = "std", target_arch = "x86_64"))]
-    if let Some(narrow) = pulp::x86::V3::try_new() {
-        return narrow.vectorize(work);
-    }
-    work()
-}
-
 #[cfg(feature = "std")]
 macro_rules! in_place {
     ($($(#[$doc:meta])* $name:ident)*) => {$(

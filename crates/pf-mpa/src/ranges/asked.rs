@@ -17,7 +17,7 @@ impl RangeTracker {
 
     /// `ln` of the probability density of the ranges since the place was found: trackers of other settings compare by it on the same ranges.
     /// Ranges of too few anchors for a place count as nothing. `None` during acquisition.
-    pub fn log_evidence(&self) -> Option<f64> {
+    pub(crate) fn log_evidence(&self) -> Option<f64> {
         let best = self.hypotheses.iter().map(Hypothesis::log_share).reduce(f64::max)?;
         let sum: f64 = self.hypotheses.iter().map(|one| (one.log_share() - best).exp()).sum();
         Some(self.evidence + best + sum.ln())

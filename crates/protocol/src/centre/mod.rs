@@ -75,11 +75,6 @@ impl Centre {
         self.slot
     }
 
-    /// The last slot in which a sensor sent anything; `None` if it sent nothing yet.
-    pub fn heard(&self, sensor: usize) -> Option<Slot> {
-        self.heard.get(sensor).copied().flatten()
-    }
-
     /// Whether a frame answers what this sensor was sent in the slot that is open: a report, or a heartbeat in place of one.
     pub fn is_answer(&self, sensor: usize, frame: &Frame<'_>) -> bool {
         self.open

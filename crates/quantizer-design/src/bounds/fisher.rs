@@ -11,7 +11,7 @@ use crate::system::System;
 ///
 /// # Errors
 /// [`Error::Argument`] if the noise is correlated.
-pub fn fisher_information(system: &System) -> Result<Vec<f64>, Error> {
+pub(crate) fn fisher_information(system: &System) -> Result<Vec<f64>, Error> {
     let model = system.model();
     if !model.is_independent() {
         return refuse("noise", "correlated noise", "independent noise for a Fisher information");
@@ -37,7 +37,7 @@ pub fn fisher_information(system: &System) -> Result<Vec<f64>, Error> {
 /// Fisher information averaged over the prior.
 ///
 /// # Errors
-/// As [`fisher_information`].
+/// [`Error::Argument`] if the noise is correlated.
 pub fn mean_fisher_information(system: &System) -> Result<f64, Error> {
     let information = fisher_information(system)?;
     Ok(information

@@ -15,7 +15,7 @@ mod fisher;
 mod unquantised;
 
 pub use ceo::{CeoBound, ceo};
-pub use fisher::{bayesian_cramer_rao, fisher_information, mean_fisher_information};
+pub use fisher::{bayesian_cramer_rao, mean_fisher_information};
 
 pub use unquantised::unquantised;
 

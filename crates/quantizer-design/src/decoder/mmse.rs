@@ -122,11 +122,6 @@ impl MmseDecoder {
         reports.moments(&features).chunks_exact(3).map(entry).collect()
     }
 
-    /// The system whose symbols are decoded.
-    pub fn system(&self) -> &System {
-        &self.system
-    }
-
     /// Number of entries, one per joint outcome.
     pub fn outcomes(&self) -> usize {
         self.entries.len()

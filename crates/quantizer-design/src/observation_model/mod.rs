@@ -205,7 +205,7 @@ impl ObservationModel {
     /// The same prior with only some of the sensors.
     ///
     /// # Errors
-    /// As [`Noise::subset`].
+    /// If `sensors` is empty or names a sensor that is not there.
     pub fn subset(&self, sensors: &[usize]) -> Result<Self, Error> {
         Self::new(self.prior.clone(), self.noise.subset(sensors)?)
     }

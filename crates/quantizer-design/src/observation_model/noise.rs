@@ -149,7 +149,7 @@ impl Noise {
     }
 
     /// Number of sensors.
-    pub fn sensors(&self) -> usize {
+    pub(crate) fn sensors(&self) -> usize {
         self.residuals.len()
     }
 
@@ -171,7 +171,7 @@ impl Noise {
     ///
     /// # Errors
     /// If `sensors` is empty or names a sensor that is not there.
-    pub fn subset(&self, sensors: &[usize]) -> Result<Self, Error> {
+    pub(crate) fn subset(&self, sensors: &[usize]) -> Result<Self, Error> {
         if let Some(n) = sensors.iter().find(|n| **n >= self.sensors()) {
             return refuse("sensor", n, format!("a number below {}", self.sensors()));
         }

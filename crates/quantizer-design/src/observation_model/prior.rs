@@ -262,7 +262,7 @@ impl Prior {
     }
 
     /// Whether the unknown is normal.
-    pub fn is_normal(&self) -> bool {
+    pub(crate) fn is_normal(&self) -> bool {
         matches!(self.shape, Shape::Gaussian { .. })
     }
 

@@ -34,13 +34,8 @@ impl Adc {
         Ok(Self { bits, low, high })
     }
 
-    /// Bits of a code.
-    pub fn bits(&self) -> u32 {
-        self.bits
-    }
-
     /// Width of the interval of a code, in the unit of the unknown.
-    pub fn step(&self) -> f64 {
+    pub(crate) fn step(&self) -> f64 {
         (self.high - self.low) / f64::from(1u32 << self.bits)
     }
 
@@ -52,7 +47,7 @@ impl Adc {
     }
 
     /// The smallest sample with this code, for a code above 0.
-    pub fn threshold(&self, code: u32) -> f64 {
+    pub(crate) fn threshold(&self, code: u32) -> f64 {
         self.low + f64::from(code) * self.step()
     }
 

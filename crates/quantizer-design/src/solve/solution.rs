@@ -33,11 +33,6 @@ impl Solutions {
         // A successful request has at least one design.
         &self.all[0]
     }
-
-    /// All designs, best first.
-    pub fn all(&self) -> &[Solution] {
-        &self.all
-    }
 }
 
 /// Cells and words of one sensor.
@@ -259,20 +254,6 @@ impl Solution {
     /// As [`MmseDecoder::new`].
     pub fn decoder(&self, limit: usize) -> Result<MmseDecoder, Error> {
         MmseDecoder::new(&self.system, limit)
-    }
-
-    /// The same sensors with other breakpoints; the certificate becomes [`Certificate::Unproved`].
-    ///
-    /// # Errors
-    /// If there is not one list per sensor, or a list has another length or is not increasing.
-    pub fn with_breakpoints(&self, breakpoints: Vec<Vec<f64>>) -> Result<Self, Error> {
-        entries("breakpoints", breakpoints.len(), self.sensors.len())?;
-        let mut cells = self.cells();
-        cells
-            .iter_mut()
-            .zip(breakpoints)
-            .for_each(|(cells, b)| cells.breakpoints = b);
-        self.with_cells(cells)
     }
 
     pub(super) fn with_cells(&self, cells: Vec<WordedCells>) -> Result<Self, Error> {

@@ -14,7 +14,7 @@ use fewbits_quantizers::lloyd_max;
 use serde::{Deserialize, Serialize};
 
 /// Default for the largest number of joint outcomes that a computation may enumerate.
-pub const OUTCOME_LIMIT: u64 = 1 << 20;
+pub(crate) const OUTCOME_LIMIT: u64 = 1 << 20;
 
 /// A model and, for each of its sensors, a quantizer and a channel.
 ///
@@ -151,7 +151,7 @@ impl System {
         Ok(system.with_outcome_limit(self.outcome_limit))
     }
 
-    /// Allows at most `limit` joint outcomes in any computation (default [`OUTCOME_LIMIT`]).
+    /// Allows at most `limit` joint outcomes in any computation (default `2^20`).
     pub fn with_outcome_limit(mut self, limit: u64) -> Self {
         self.outcome_limit = limit;
         self

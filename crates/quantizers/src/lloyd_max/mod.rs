@@ -44,12 +44,12 @@ use crate::quantizer::check_increasing;
 use std::sync::OnceLock;
 
 /// Largest number of levels. For more levels a uniform quantizer with dither is as good.
-pub const MAX_LEVELS: usize = 4096;
+pub(crate) const MAX_LEVELS: usize = 4096;
 
 /// The Lloyd-Max quantizer of `density` with `levels` levels.
 ///
 /// # Errors
-/// [`Error::Argument`] if `levels` is not in `2..=MAX_LEVELS`, or if the density is so far from zero that breakpoints
+/// [`Error::Argument`] if `levels` is not in `2..=4096`, or if the density is so far from zero that breakpoints
 /// coincide; [`Error::NotConverged`] if the density is too rough for an optimum to be found; [`Error::NotOptimal`] if so many levels leave
 /// a cell empty.
 pub fn design(density: &impl Density, levels: usize) -> Result<LloydMax, Error> {

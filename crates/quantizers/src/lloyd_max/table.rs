@@ -83,11 +83,6 @@ impl LloydMax {
         &self.probabilities
     }
 
-    /// Number of levels.
-    pub fn levels(&self) -> usize {
-        self.centroids.len()
-    }
-
     /// Mean squared error of reconstruction by centroids, in the squared unit of the variable.
     pub fn mean_squared_error(&self) -> f64 {
         self.mean_squared_error

@@ -82,7 +82,7 @@ impl LinearSearch {
     ///
     /// # Errors
     /// If full rank is required of fewer sensors than bits, or the number exceeds 128 bits.
-    pub fn sets(&self) -> Result<u128, Error> {
+    pub(crate) fn sets(&self) -> Result<u128, Error> {
         if self.full_rank {
             full_rank_multisets(self.bits, self.sensors)
         } else {

@@ -1,8 +1,8 @@
 //! Divergences by quadrature over all of space, in one to three dimensions.
 
-use crate::Error;
 use fewbits_core::Columns;
 use fewbits_densities::Mixture;
+use fewbits_mixture_codec::Error;
 use fewbits_numerics::error::{positive, refuse};
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! Quadrature against closed forms.
 
+use fewbits_baselines::mixture_codec::quadrature::{QuadratureGrid, integrated};
 use fewbits_densities::{Component, Mixture};
-use fewbits_mixture_codec::quadrature::{QuadratureGrid, integrated};
 use nalgebra::{SMatrix, SVector};
 
 fn normal<const D: usize>(mean: [f64; D], covariance: SMatrix<f64, D, D>) -> Mixture<D> {
