@@ -4,7 +4,7 @@ use crate::arguments::TableOptions;
 use crate::clock;
 use crate::error::Error;
 use crate::files::is_regular;
-use crate::opening::{chosen, name_of, time_columns};
+use crate::opening::{chosen, decided, name_of, time_columns};
 use crate::say::say;
 use fewbits_recipes::{table as recipe, times};
 use fewbits_record::{Integers, TimeBase};
@@ -115,8 +115,17 @@ impl Table {
         self.row
     }
 
-    /// Uses the columns whose cells or names say that they are times, unless the user named some.
-    pub(crate) fn find_time(&mut self, nanoseconds: u64) -> Result<(), Error> {
+    /// As [`open`](Self::open), with the columns whose cells or names say that they are times, unless the user named some. If the first rows
+    /// leave open whether day or month stands first, all rows of a file decide.
+    pub(crate) fn open_with_time(options: &TableOptions, nanoseconds: u64) -> Result<Self, Error> {
+        decided(options, |options| {
+            let mut table = Self::open(options)?;
+            table.find_time(nanoseconds)?;
+            Ok(table)
+        })
+    }
+
+    fn find_time(&mut self, nanoseconds: u64) -> Result<(), Error> {
         if self.table.time().is_none() {
             self.table.find_certain_time().map_err(Error::of_table(&self.file))?;
             self.table.allow_inexact_times(nanoseconds);

@@ -136,22 +136,25 @@ impl Clock {
 
     /// The time of a cell.
     pub(crate) fn parse(&self, text: &str) -> Result<Time, Problem> {
-        self.quick(text).map_or_else(|| self.slowly(text), Ok)
+        self.quick(text.as_bytes()).map_or_else(|| self.slowly(text), Ok)
     }
 
     /// The time of a cell in one of the usual spellings; `None` if it may be anything.
-    fn quick(&self, text: &str) -> Option<Time> {
+    #[inline]
+    pub(crate) fn quick(&self, text: &[u8]) -> Option<Time> {
         match self.syntax {
-            Syntax::Number(unit) => quick::ticks(text.as_bytes(), unit.decimals()),
-            Syntax::Date(_) => self.quick_date(text),
+            Syntax::Number(unit) => quick::ticks(text, unit.decimals()),
+            Syntax::OfDay => quick::of_day(text),
+            Syntax::Date(order) if self.zone.is_none() || self.scale == Scale::Utc => {
+                quick::date(text, order, self.scale)
+            }
             _ => None,
         }
     }
 
-    /// The time of a cell with a date in one of the usual spellings; `None` if it may be anything.
-    pub(crate) fn quick_date(&self, text: &str) -> Option<Time> {
-        let is_placed = matches!(self.syntax, Syntax::Date(_)) && (self.zone.is_none() || self.scale == Scale::Utc);
-        is_placed.then(|| quick::date(text.as_bytes(), self.scale))?
+    /// Whether times are written with marks, so that none is a number.
+    pub(crate) fn is_written(&self) -> bool {
+        matches!(self.syntax, Syntax::OfDay | Syntax::Date(_))
     }
 
     fn slowly(&self, text: &str) -> Result<Time, Problem> {
