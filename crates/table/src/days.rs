@@ -13,11 +13,33 @@ fn has_date_name(names: &[&str]) -> bool {
     names.len() == 1 && names.iter().any(is_date)
 }
 
-/// A year and the day of the year as one number, which only the name of the column tells from a count.
+/// A year and the day of the year, or a time of day, as one number, which only the name of the column tells from a count.
 pub(crate) fn by_name(names: &[&str], cells: &[&str]) -> Option<Syntax> {
     let is_day =
         |cell: &&str| cell.len() == 7 && civil::written(cell, Order::Ymd).is_some_and(|found| found.date.is_ok());
-    (has_date_name(names) && !cells.is_empty() && cells.iter().all(is_day)).then_some(Syntax::Date(Order::Ymd))
+    if cells.is_empty() {
+        None
+    } else if has_date_name(names) && cells.iter().all(is_day) {
+        Some(Syntax::Date(Order::Ymd))
+    } else {
+        (is_of_day_name(names) && cells.iter().all(|cell| civil::of_digits(cell).is_some())).then_some(Syntax::OfDay)
+    }
+}
+
+/// Whether a column is named as one of times of day without marks, as receivers of satellites write them: `213000.50`.
+fn is_of_day_name(names: &[&str]) -> bool {
+    const WORDS: [&str; 9] = [
+        "utc",
+        "utc_time",
+        "utc time",
+        "time_utc",
+        "utctime",
+        "gps_time",
+        "gpstime",
+        "hhmmss",
+        "hhmmss.ss",
+    ];
+    matches!(names, [name] if WORDS.contains(&name.to_lowercase().as_str()))
 }
 
 /// Whether a column is named as one of Julian dates and has numbers of their size.

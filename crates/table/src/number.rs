@@ -211,7 +211,8 @@ fn special(text: &str) -> Option<f64> {
     })
 }
 
-/// The number without the marks between groups of three digits; `None` if a group has another length.
+/// The number without the marks between groups of digits: of three, or, as in India, of three at the end and of two before. `None` if a
+/// group has another length.
 fn grouped(text: &str, mark: char, decimal: char) -> Option<String> {
     if !text.contains(mark) {
         return Some(text.to_owned());
@@ -219,8 +220,15 @@ fn grouped(text: &str, mark: char, decimal: char) -> Option<String> {
     let (whole, rest) = text.split_once(decimal).unwrap_or((text, ""));
     let (sign, digits) = whole.split_at(usize::from(whole.starts_with(['-', '+'])));
     let groups: Vec<&str> = digits.split(mark).collect();
-    let whole_groups = groups.iter().skip(1).all(|group| group.len() == 3) && (1..=3).contains(&groups[0].len());
-    if !whole_groups || rest.contains(mark) {
+    let are_of = |groups: &[&str], length: usize| {
+        let (first, rest) = groups.split_first().unwrap_or((&"", &[]));
+        (1..=length).contains(&first.len()) && rest.iter().all(|group| group.len() == length)
+    };
+    let is_grouped = match groups.split_last() {
+        Some((last, before)) => are_of(&groups, 3) || (last.len() == 3 && are_of(before, 2)),
+        None => false,
+    };
+    if !is_grouped || rest.contains(mark) {
         return None;
     }
     let decimal = if rest.is_empty() {
@@ -304,6 +312,12 @@ mod tests {
         assert_eq!(of("1,721,992,142.283", b'.', Some(b',')), Some(1_721_992_142.283));
         assert_eq!(of("-1 234.5", b'.', Some(b' ')), Some(-1234.5));
         assert_eq!(of("1,72", b'.', Some(b',')), None);
+        // Lakhs and crores.
+        assert_eq!(of("1,23,456.75", b'.', Some(b',')), Some(123_456.75));
+        assert_eq!(of("-12,34,56,789", b'.', Some(b',')), Some(-123_456_789.0));
+        for text in ["1,234,56,789", "1,23,45", "123,45,678", "1,2,345", ",345", "1,,345"] {
+            assert_eq!(of(text, b'.', Some(b',')), None, "{text}");
+        }
         assert_eq!(of("19.75", b',', None), None);
         assert_eq!(value("\u{2212}3.5"), Some(-3.5));
         assert_eq!(value("+ 0.081"), Some(0.081));

@@ -167,7 +167,10 @@ impl Clock {
                 Ok(Time(size.checked_add(i128::from(*zero) * SECOND).ok_or(NO_TIME)?))
             }
             Syntax::OfDay => {
-                if let Some((second, fraction)) = civil::of_hour(text).or_else(|| civil::of_days(text)) {
+                let found = civil::of_hour(text)
+                    .or_else(|| civil::of_days(text))
+                    .or_else(|| civil::of_digits(text));
+                if let Some((second, fraction)) = found {
                     return Ok(Time::checked(second, fraction));
                 }
                 let (second, fraction, leap, rest) = civil::of_day(text).ok_or(NO_TIME)?;

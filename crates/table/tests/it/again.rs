@@ -155,3 +155,35 @@ fn days_that_may_be_months_are_an_error_of_their_own() {
         assert_eq!(table.survey().unwrap().columns[0].day_order(), Some(order));
     }
 }
+
+#[test]
+fn groups_of_spreadsheets_and_times_without_marks() {
+    // A decimal comma behind groups with thin spaces, and no other column to tell.
+    for space in ['\u{202f}', '\u{a0}', '\u{2009}', ' '] {
+        let text = (0..6).fold("Jour;Énergie\n".to_owned(), |text, i| text + &format!("{};1{space}23{i},7\n", 13 + i));
+        let said = Dialect {
+            thousands: Some(' '),
+            ..Dialect::default()
+        };
+        let survey = open_said(&text, &said).unwrap().survey().unwrap();
+        assert_eq!(survey.columns[1].range, Some((1230.7, 1235.7)), "{space:?}");
+    }
+    let text = "day,energy\n1,\"1,23,456.5\"\n2,\"99,999\"\n3,\"1,00,00,000\"\n";
+    let said = Dialect {
+        thousands: Some(','),
+        ..Dialect::default()
+    };
+    let survey = open_said(text, &said).unwrap().survey().unwrap();
+    assert_eq!(survey.columns[1].range, Some((99_999.0, 10_000_000.0)));
+    // Times of day of a receiver, by their name and size; else they are numbers.
+    for (name, expected) in [
+        ("utc", [36_059.5, 36_060.0, 86_399.0]),
+        ("UTC_Time", [36_059.5, 36_060.0, 86_399.0]),
+        ("seconds", [100_059.5, 100_100.0, 235_959.0]),
+    ] {
+        let mut table = open(&format!("{name},lat\n100059.50,1\n100100.00,2\n235959,3\n"));
+        assert_eq!(seconds(&super::rows(&mut table)), expected, "{name}");
+    }
+    let mut table = open("utc,lat\n100059.5,1\n100061.5,2\n100079.5,3\n");
+    assert_eq!(seconds(&super::rows(&mut table)), [100_059.5, 100_061.5, 100_079.5]);
+}
