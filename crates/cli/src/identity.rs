@@ -24,8 +24,9 @@ struct Hash {
 
 impl Hash {
     fn word(&mut self, word: u64) {
-        // Turned, so that all bits of a word reach all others with the words behind it.
-        self.state = (self.state.rotate_left(23) ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        // Both halves of a product, so that every bit of a word reaches all others.
+        let product = u128::from(self.state ^ word) * 0x9e37_79b9_7f4a_7c15_u128;
+        self.state = ((product ^ (product >> 64)) as u64).wrapping_add(0xd6e8_feb8_6659_fd93);
     }
 
     fn add(&mut self, mut bytes: &[u8]) {
@@ -52,10 +53,10 @@ impl Hash {
     fn finish(mut self) -> u64 {
         let mut rest = [0; 8];
         rest[..self.length].copy_from_slice(&self.rest[..self.length]);
-        for word in [u64::from_le_bytes(rest), self.count, 0] {
+        for word in [u64::from_le_bytes(rest), self.count, 0, 0] {
             self.word(word);
         }
-        self.state ^ (self.state >> 32)
+        self.state
     }
 }
 
