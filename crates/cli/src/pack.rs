@@ -224,7 +224,7 @@ fn fill<W: Write>(
 }
 
 /// The tolerance of a recording's times, as `--time` takes it.
-fn own_tolerance(time: TimeBase) -> String {
+pub(crate) fn own_tolerance(time: TimeBase) -> String {
     match time {
         TimeBase::Clock {
             tolerance: ticks @ 1..,

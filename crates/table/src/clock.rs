@@ -337,6 +337,7 @@ fn majority(cells: &[&str]) -> Found {
     match found {
         Some(Ok(syntax)) => Ok(syntax),
         Some(Err(doubt)) => Err(Refused::Doubt(doubt)),
+        None if cells.iter().all(|cell| interval::spelled(cell).is_some()) => Ok(Syntax::Spelled),
         None => {
             let first = cells
                 .iter()

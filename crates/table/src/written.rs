@@ -21,6 +21,8 @@ pub(crate) enum Syntax {
     Parts(Vec<Part>, bool),
     /// A date, and hour, minute and second in columns of their own.
     DateAnd(Order, Vec<Part>),
+    /// Numbers with a unit behind each, as `1.5 sec`.
+    Spelled,
     /// Units of so many seconds since a zero, in seconds since 1970.
     Since(i64, i64),
     Format(String),
@@ -161,11 +163,8 @@ impl Clock {
         let text = text.trim();
         match &self.syntax {
             Syntax::Number(unit) => self.number(text, *unit),
-            Syntax::Since(unit, zero) => {
-                let count = self.number(text, Unit::Seconds)?;
-                let size = count.0.checked_mul(i128::from(*unit)).ok_or(NO_TIME)?;
-                Ok(Time(size.checked_add(i128::from(*zero) * SECOND).ok_or(NO_TIME)?))
-            }
+            Syntax::Since(unit, zero) => self.since(text, *unit, *zero),
+            Syntax::Spelled => self.spelled(text),
             Syntax::OfDay => {
                 let found = civil::of_hour(text)
                     .or_else(|| civil::of_days(text))
@@ -197,7 +196,7 @@ impl Clock {
         }
     }
 
-    fn number(&self, text: &str, unit: Unit) -> Result<Time, Problem> {
+    pub(crate) fn number(&self, text: &str, unit: Unit) -> Result<Time, Problem> {
         match number(text, unit) {
             Err(problem) if problem == TOO_FINE && self.cuts => {
                 // What is cut is less than a nanosecond.

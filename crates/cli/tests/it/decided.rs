@@ -98,3 +98,24 @@ fn refusals_of_huge_ranges_are_short() {
     let output = fewbits(&folder, &["pack", "t.csv", "--time", "exact", "-o", "r"], b"");
     assert!(output.status.success(), "{}", text(&output.stderr));
 }
+
+/// Defect: a word of a line that is left out for its time made a column of booleans one of words, and `verify` raised an alarm.
+#[test]
+fn lines_that_are_left_out_do_not_tell_what_columns_are() {
+    let (_kept, folder) = folder();
+    for (name, bad) in [
+        ("a", "no time,9,FAL\n"),
+        ("b", ",x7,open\n"),
+        ("c", "2024-13-05 10:09,7,0.5\n"),
+    ] {
+        let rows = (0..9).map(|i| format!("2024-03-05 10:0{i},{i},{}\n", if i % 2 == 0 { "TRUE" } else { "FALSE" }));
+        let table = format!("{name}.csv");
+        std::fs::write(folder.join(&table), "when,x,ok\n".to_owned() + &rows.collect::<String>() + bad).unwrap();
+        for time in ["exact", "±1ms"] {
+            let words = ["pack", &table, "--time", time, "--skip-bad", "1", "-o", name];
+            good(&folder, &words, b"");
+            let said = good(&folder, &["verify", &table, "--skip-bad", "1", name], b"");
+            assert!(text(&said).contains("9 rows: all promises hold"), "{}", text(&said));
+        }
+    }
+}

@@ -187,3 +187,23 @@ fn groups_of_spreadsheets_and_times_without_marks() {
     let mut table = open("utc,lat\n100059.5,1\n100061.5,2\n100079.5,3\n");
     assert_eq!(seconds(&super::rows(&mut table)), [100_059.5, 100_061.5, 100_079.5]);
 }
+
+#[test]
+fn times_with_a_unit_behind_each() {
+    for (cells, expected) in [
+        (["0 sec", "1.5 sec", "59.25 sec"], [0.0, 1.5, 59.25]),
+        (["-2 min", "0 min", "0.5 min"], [-120.0, 0.0, 30.0]),
+        (["500ms", "1 s", "1h"], [0.5, 1.0, 3600.0]),
+        (["1 days", "2 days", "3 hr"], [86_400.0, 172_800.0, 10_800.0]),
+    ] {
+        let text = cells
+            .iter()
+            .fold("Time,Var1\n".to_owned(), |text, cell| text + cell + ",1.5\n");
+        let mut table = open(&text);
+        assert_eq!(seconds(&super::rows(&mut table)), expected, "{text}");
+    }
+    // A value with such a unit is no time, and a cell without one is none among these.
+    assert_eq!(open("t,lag\n0,5 s\n1,6 s\n2,7 s\n").columns()[1].kind, Kind::Number);
+    let mut table = open("Time,x\n0 sec,1\n1 sec,2\n2 sec,3\n3 apples,4\n4 sec,5\n");
+    table.set_time(&["Time"]).unwrap_err();
+}
