@@ -4,11 +4,11 @@ use crate::arguments::TableOptions;
 use crate::clock;
 use crate::error::Error;
 use crate::files::is_regular;
-use crate::opening::{chosen, name_of, time_columns};
+use crate::opening::{chosen, decided, name_of, time_columns};
 use crate::say::say;
 use fewbits_recipes::{table as recipe, times};
 use fewbits_record::{Integers, TimeBase};
-use fewbits_table::{Batch, FewCells, Kind, Side};
+use fewbits_table::{Batch, FewCells, Kind, Side, names};
 
 /// A row: its tick (`None` if rows are numbered) and its cells.
 pub(crate) type Row = (Option<i64>, Vec<Option<f64>>);
@@ -18,6 +18,7 @@ pub(crate) type Cells = Vec<Vec<Option<f64>>>;
 
 /// Rows of a file that are read at once. Of anything else, one: a live row waits for no other.
 const ROWS: usize = 512;
+
 /// An open table.
 pub(crate) struct Table {
     file: String,
@@ -115,8 +116,17 @@ impl Table {
         self.row
     }
 
-    /// Uses the columns whose cells or names say that they are times, unless the user named some.
-    pub(crate) fn find_time(&mut self, nanoseconds: u64) -> Result<(), Error> {
+    /// As [`open`](Self::open), with the columns whose cells or names say that they are times, unless the user named some. If the first rows
+    /// leave open whether day or month stands first, all rows of a file decide.
+    pub(crate) fn open_with_time(options: &TableOptions, nanoseconds: u64) -> Result<Self, Error> {
+        decided(options, |options| {
+            let mut table = Self::open(options)?;
+            table.find_time(nanoseconds)?;
+            Ok(table)
+        })
+    }
+
+    fn find_time(&mut self, nanoseconds: u64) -> Result<(), Error> {
         if self.table.time().is_none() {
             self.table.find_certain_time().map_err(Error::of_table(&self.file))?;
             self.table.allow_inexact_times(nanoseconds);
@@ -125,8 +135,7 @@ impl Table {
         Ok(())
     }
 
-    /// Takes these columns of values, by their indices among all columns, and the time from the columns of this list, from where the table
-    /// has it, or from a column that is left over.
+    /// Takes these columns of values, by index, and the time from those of a list, from where the table has it, or from one left over.
     pub(crate) fn choose(
         &mut self,
         list: Option<&str>,
@@ -160,6 +169,26 @@ impl Table {
         let names: Vec<&String> = columns.iter().map(|i| &all[*i]).collect();
         self.table.select(&names).map_err(&failed)?;
         self.rename();
+        Ok(())
+    }
+
+    /// Learns anew what columns are if lines are left out: those without a time, which was chosen since, tell nothing.
+    pub(crate) fn learn_with_time(&mut self, options: &TableOptions, time: Option<String>) -> Result<(), Error> {
+        let skips = self.learned.is_some() && options.dialect.said()?.skip_bad > 0;
+        let Some((columns, _)) = self.table.time().filter(|_| skips) else {
+            return Ok(());
+        };
+        let list = columns.iter().map(|i| names::quoted(&self.table.columns()[*i].name));
+        let again = TableOptions {
+            time,
+            time_column: Some(list.collect::<Vec<_>>().join(",")),
+            columns: Vec::new(),
+            without: None,
+            ..options.clone()
+        };
+        let survey = chosen(&again)?.survey().map_err(Error::of_table(&self.file))?;
+        self.table.use_survey(&survey);
+        self.learned = Some(survey);
         Ok(())
     }
 

@@ -15,6 +15,7 @@ mod files;
 mod fit_options;
 mod fleet_options;
 mod generate;
+mod identity;
 mod info;
 mod input;
 mod interrupt;

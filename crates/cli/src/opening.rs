@@ -59,7 +59,8 @@ fn opened(options: &TableOptions, file: &str) -> Result<fewbits_table::Table, Er
         }
     }
     let bar = progress(source.metadata().ok().map(|data| data.len()));
-    fewbits_table::Table::open(bar.wrap_read(source), &said).map_err(Error::of_table(file))
+    let source = options.identity.read(bar.wrap_read(source));
+    fewbits_table::Table::open(source, &said).map_err(Error::of_table(file))
 }
 
 /// The name of the table in messages.
@@ -77,10 +78,7 @@ pub(crate) fn chosen(options: &TableOptions) -> Result<fewbits_table::Table, Err
 }
 
 /// A table, opened once more with the order of day and month that all of its dates decide, if it was refused for that.
-fn decided(
-    options: &TableOptions,
-    open: impl Fn(&TableOptions) -> Result<fewbits_table::Table, Error>,
-) -> Result<fewbits_table::Table, Error> {
+pub(crate) fn decided<T>(options: &TableOptions, open: impl Fn(&TableOptions) -> Result<T, Error>) -> Result<T, Error> {
     let refused = match open(options) {
         Err(Error::Refusal { file, source }) if source.is_day_or_month() => Error::Refusal { file, source },
         other => return other,

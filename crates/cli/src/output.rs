@@ -138,12 +138,15 @@ pub(crate) fn is_parquet(path: &Path) -> bool {
 
 /// Writes rows of a recording, as Parquet if the file name has that extension.
 pub(crate) enum Writer {
-    Sheet {
-        sheet: Sheet,
-        cells: Cells,
-    },
+    Sheet(Box<Texts>),
     #[cfg(feature = "parquet")]
     Parquet(Box<crate::parquet::Sink>),
+}
+
+/// Rows of a recording as text.
+pub(crate) struct Texts {
+    sheet: Sheet,
+    cells: Cells,
 }
 
 impl Writer {
@@ -158,15 +161,15 @@ impl Writer {
             });
         }
         let cells = Cells::new(schema, names, shape == Shape::Json);
-        Ok(Self::Sheet {
+        Ok(Self::Sheet(Box::new(Texts {
             sheet: Sheet::new(path, shape, cells.names().to_vec())?,
             cells,
-        })
+        })))
     }
 
     pub(crate) fn write(&mut self, tick: i64, values: &[Option<f64>]) -> Result<(), Error> {
         match self {
-            Self::Sheet { sheet, cells } => sheet.write(cells.row(tick, values)),
+            Self::Sheet(texts) => texts.sheet.write(texts.cells.row(tick, values)),
             #[cfg(feature = "parquet")]
             Self::Parquet(sink) => sink.write(tick, values),
         }
@@ -175,7 +178,7 @@ impl Writer {
     /// Writes out all rows so far, if the format allows it.
     pub(crate) fn flush(&mut self) -> Result<(), Error> {
         match self {
-            Self::Sheet { sheet, .. } => sheet.flush(),
+            Self::Sheet(texts) => texts.sheet.flush(),
             #[cfg(feature = "parquet")]
             Self::Parquet(_) => Ok(()),
         }
@@ -184,7 +187,7 @@ impl Writer {
     /// Completes the file.
     pub(crate) fn finish(self) -> Result<(), Error> {
         match self {
-            Self::Sheet { sheet, .. } => sheet.finish(),
+            Self::Sheet(texts) => texts.sheet.finish(),
             #[cfg(feature = "parquet")]
             Self::Parquet(sink) => sink.finish(),
         }

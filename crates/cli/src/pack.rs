@@ -3,11 +3,12 @@
 use crate::arguments::{BoundOptions, PackOptions, TableOptions};
 use crate::error::Error;
 use crate::files::is_regular;
+use crate::identity::Identity;
 use crate::input::{Survey, Table};
 use crate::live::{self, RowSink};
 use crate::rows::TableRows;
 use crate::say::say;
-use crate::single_pass::{identity, is_written_beside, readable_once};
+use crate::single_pass::{is_written_beside, readable_once};
 use crate::target::{self, Target};
 use crate::{Ending, bounds, clock};
 use fewbits_recipes::bounds::exact;
@@ -223,7 +224,7 @@ fn fill<W: Write>(
 }
 
 /// The tolerance of a recording's times, as `--time` takes it.
-fn own_tolerance(time: TimeBase) -> String {
+pub(crate) fn own_tolerance(time: TimeBase) -> String {
     match time {
         TimeBase::Clock {
             tolerance: ticks @ 1..,
@@ -292,6 +293,9 @@ fn appended(
 }
 
 fn create(options: &PackOptions, effort: Effort) -> Result<(Done, Option<Error>), Error> {
+    let mut options = options.clone();
+    options.table.identity = Identity::wanted();
+    let options = &options;
     // If no range is needed and all rows are like the first ones, reading them once gives the same bytes as reading them twice.
     if options.output.as_deref().is_some_and(is_written_beside)
         && let Some(table) = readable_once(&options.table, &options.bounds)?
@@ -314,7 +318,12 @@ fn created(
     let file = sink.name().to_owned();
     let mut recorder = Recorder::new(Counted { sink, bytes: 0 }, schema.clone()).with_effort(effort);
     if is_regular(&options.table.file) {
-        let identity = identity(&options.table.file, &schema).map_err(Error::io(&options.table.file, "read"))?;
+        let file = &options.table.file;
+        let identity = options
+            .table
+            .identity
+            .of(file, &schema)
+            .map_err(Error::io(file, "read"))?;
         recorder = recorder.with_identity(identity);
     }
     let (counted, rows, error) = fill(table, recorder, options, &file)?;

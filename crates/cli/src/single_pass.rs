@@ -1,12 +1,9 @@
-//! Tables that are packed in a single pass, and the identity of what is packed.
+//! Tables that are packed in a single pass.
 
 use crate::arguments::{BoundOptions, TableOptions};
 use crate::error::Error;
 use crate::files::is_regular;
 use crate::input::Table;
-use fewbits_record::Schema;
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 /// Whether an output is written beside its place, so that it can be given up.
@@ -25,18 +22,4 @@ pub(crate) fn readable_once(options: &TableOptions, bounds: &BoundOptions) -> Re
     }
     let table = Table::open(options)?;
     Ok(table.is_plain().then_some(table))
-}
-
-/// An identity that depends on the bytes of the table and on the schema: the same command gives the same bytes, also after a kill.
-pub(crate) fn identity(file: &str, schema: &Schema) -> std::io::Result<u32> {
-    // FNV-1a.
-    let add = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
-    let mut hash = format!("{schema:?}").as_bytes().iter().fold(0xcbf2_9ce4_8422_2325, add);
-    let (mut source, mut chunk) = (File::open(file)?, vec![0; 1 << 16]);
-    loop {
-        match source.read(&mut chunk)? {
-            0 => return Ok((hash ^ (hash >> 32)) as u32),
-            count => hash = chunk[..count].iter().fold(hash, add),
-        }
-    }
 }

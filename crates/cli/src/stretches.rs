@@ -7,7 +7,7 @@ use crate::say::say;
 use crate::unpack::{selection, warn_of_end};
 use crate::{Ending, clock, recording};
 use fewbits_recipes::words;
-use fewbits_record::{Aggregate, Schema, Stretch, TimeBase};
+use fewbits_record::{Aggregate, Schema, Stretch, TimeBase, WholeAggregate};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -15,24 +15,34 @@ use std::path::Path;
 struct Kind {
     name: &'static str,
     cell: fn(&Aggregate) -> Cell,
+    whole: fn(&WholeAggregate) -> Cell,
+}
+
+/// A whole number, or a gap.
+fn whole(number: Option<i64>) -> Cell {
+    number.map_or(Cell::Number(None), Cell::Whole)
 }
 
 const KINDS: [Kind; 4] = [
     Kind {
         name: "mean",
         cell: |all| Cell::Number(all.mean()),
+        whole: |all| Cell::Number(all.mean()),
     },
     Kind {
         name: "min",
         cell: |all| Cell::Number(all.ends().map(|ends| ends.0)),
+        whole: |all| whole(all.ends().map(|ends| ends.0)),
     },
     Kind {
         name: "max",
         cell: |all| Cell::Number(all.ends().map(|ends| ends.1)),
+        whole: |all| whole(all.ends().map(|ends| ends.1)),
     },
     Kind {
         name: "count",
-        cell: |all| Cell::Whole(i64::try_from(all.count()).unwrap_or(i64::MAX)),
+        cell: |all| whole(i64::try_from(all.count()).ok()),
+        whole: |all| whole(i64::try_from(all.count()).ok()),
     },
 ];
 
@@ -56,16 +66,16 @@ fn length(text: &str, time: TimeBase) -> Result<u64, Error> {
     }
 }
 
-/// The columns whose numbers are values: those of words have none, and those of whole numbers of 64 bits are codes.
+/// The columns whose numbers are values: those of words have none.
 fn columns(options: &CatOptions, schema: &Schema, names: Vec<String>) -> Result<Vec<String>, Error> {
     let is_words = |name: &String| {
         let column = schema.position(name).map(|i| &schema.columns()[i]);
-        column.is_ok_and(|column| words::of(column.unit()).is_some() || column.integers().is_some())
+        column.is_ok_and(|column| words::of(column.unit()).is_some())
     };
     if !options.columns.is_empty()
         && let Some(name) = names.iter().find(|name| is_words(name))
     {
-        return Err(Error::option("--columns", name, "columns of numbers within 53 bits with --every"));
+        return Err(Error::option("--columns", name, "columns of numbers with --every"));
     }
     Ok(names.into_iter().filter(|name| !is_words(name)).collect())
 }
@@ -75,6 +85,8 @@ pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
     let mut ending = Ending::Good;
     let mut found: BTreeMap<i64, Stretch> = BTreeMap::new();
     let mut head: Option<(TimeBase, u64, Vec<String>, String)> = None;
+    // Whether each column has whole numbers of 64 bits, in the first recording.
+    let mut wholes: Option<Vec<bool>> = None;
     for file in &options.files {
         let mut playback = recording::open(Path::new(file))?;
         let schema = playback.schema().clone();
@@ -97,6 +109,21 @@ pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
         }
         let wanted: Vec<&str> = names.iter().map(String::as_str).collect();
         playback.columns(&wanted).map_err(Error::recording(file))?;
+        let is_whole = |name: &String| {
+            schema
+                .position(name)
+                .is_ok_and(|i| schema.columns()[i].integers().is_some())
+        };
+        let own: Vec<bool> = names.iter().map(is_whole).collect();
+        let first = wholes.get_or_insert_with(|| own.clone());
+        if let Some(i) = (0..own.len()).find(|i| own[*i] != first[*i]) {
+            let name = crate::say::name(&names[i]);
+            let problem = format!(
+                "column `{name}` has whole numbers of 64 bits in this recording or in {}, and doubles in the other: read each by itself",
+                options.files[0]
+            );
+            return Err(Error::content(file, problem));
+        }
         if !playback.is_finished() {
             warn_of_end(file);
             ending = Ending::Failed;
@@ -116,6 +143,12 @@ pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
                     all.rows += stretch.rows;
                     let pairs = all.columns.iter_mut().zip(&stretch.columns);
                     pairs.for_each(|(sum, more)| sum.merge(more));
+                    let pairs = all.wholes.iter_mut().zip(&stretch.wholes);
+                    pairs.for_each(|pair| {
+                        if let (Some(sum), Some(more)) = pair {
+                            sum.merge(more);
+                        }
+                    });
                 }
             }
         }
@@ -154,10 +187,13 @@ pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
             TimeBase::Numbered => Cell::Whole(stretch.tick),
             time => Cell::Text(clock::shown(stretch.tick, time)),
         };
-        let cells = stretch
-            .columns
-            .iter()
-            .flat_map(|all| kinds.iter().map(move |kind| (kind.cell)(all)));
+        let pairs = stretch.columns.iter().zip(&stretch.wholes);
+        let cells = pairs.flat_map(|(all, whole)| {
+            kinds.iter().map(move |kind| match whole {
+                Some(whole) => (kind.whole)(whole),
+                None => (kind.cell)(all),
+            })
+        });
         sheet.write(std::iter::once(tick).chain(cells))?;
     }
     sheet.finish()?;

@@ -1,6 +1,7 @@
 //! Options of all tasks on tables: how a table is read, several files, bounds.
 
 use crate::error::Error;
+use crate::identity::Identity;
 use crate::many::Shard;
 use clap::Args;
 use std::path::PathBuf;
@@ -28,6 +29,9 @@ pub(crate) struct TableOptions {
     pub(crate) by: Option<String>,
     #[command(flatten)]
     pub(crate) dialect: DialectOptions,
+    /// Hashes the file as it is read.
+    #[arg(skip)]
+    pub(crate) identity: Identity,
 }
 
 impl TableOptions {

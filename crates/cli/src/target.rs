@@ -9,10 +9,12 @@
 use crate::error::Error;
 use crate::interrupt;
 use crate::say::say;
+use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// Name of standard output in messages.
 pub(crate) const STANDARD_OUTPUT: &str = "standard output";
@@ -188,21 +190,25 @@ fn beside(path: &Path, name: &str) -> Result<(File, PathBuf), Error> {
     Err(Error::io(name, "create a file beside it for")(failure))
 }
 
+/// Unfinished files of each folder, as they were when this command first wrote there: to list a folder for each of many outputs takes
+/// longer than to write them.
+static FOUND: Mutex<BTreeMap<PathBuf, Vec<String>>> = Mutex::new(BTreeMap::new());
+
+fn unfinished_in(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    names.filter(|name| name.ends_with(UNFINISHED)).collect()
+}
+
 /// Removes unfinished files for the same output whose writers were killed: a writer that lives holds the lock of its file.
 fn remove_abandoned(own: &Path, kept: &str) {
     let folder = own.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let Ok(entries) = std::fs::read_dir(folder.unwrap_or(Path::new("."))) else {
-        return;
-    };
-    for entry in entries.flatten() {
-        let name = entry.file_name();
-        let Some(name) = name.to_str() else { continue };
-        let is_other = name.starts_with(kept) && name.ends_with(UNFINISHED);
-        if !is_other || own.file_name().is_some_and(|own| own == name) {
-            continue;
-        }
-        let path = entry.path();
-        if is_abandoned(&path) {
+    let folder = folder.unwrap_or(Path::new("."));
+    let mut found = FOUND.lock().unwrap_or_else(PoisonError::into_inner);
+    let names = found.entry(folder.to_owned()).or_insert_with(|| unfinished_in(folder));
+    for name in names.iter().filter(|name| name.starts_with(kept)) {
+        let path = folder.join(name);
+        if path != own && is_abandoned(&path) {
             let _ = std::fs::remove_file(&path);
         }
     }

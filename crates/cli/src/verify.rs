@@ -102,6 +102,9 @@ fn matched(table: &mut Table, options: &TableOptions, schema: &Schema) -> Result
         .as_ref()
         .map_or(options.time_column.as_deref(), |_| Some("#1"));
     table.choose(list, time, &columns, schema.time())?;
+    if options.by.is_none() {
+        table.learn_with_time(options, Some(own_tolerance(schema.time())))?;
+    }
     let recorded: Vec<&fewbits_record::Column> = matches.iter().map(|index| &schema.columns()[*index]).collect();
     table.use_words(&recorded)?;
     Ok(matches)

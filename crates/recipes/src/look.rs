@@ -141,7 +141,7 @@ pub fn look(table: Table, watch: &mut Watch<'_>) -> Result<Look, Error> {
         columns: columns
             .iter()
             .zip(&survey.columns)
-            .map(|(known, profile)| column(known, profile, &survey))
+            .map(|(known, profile)| column(known, profile, &survey, dialect.time_column.contains(&known.name)))
             .collect(),
         long,
         lines_left_out: survey.skipped.bad,
@@ -151,8 +151,9 @@ pub fn look(table: Table, watch: &mut Watch<'_>) -> Result<Look, Error> {
     })
 }
 
-fn column(column: &Column, profile: &Profile, survey: &Survey) -> LookColumn {
-    let suspicious = profile.suspicious();
+fn column(column: &Column, profile: &Profile, survey: &Survey, is_time: bool) -> LookColumn {
+    // Cells of the time that are none are lines that cannot be read.
+    let suspicious = if is_time { 0 } else { profile.suspicious() };
     let first = profile.first_text.as_ref().filter(|_| suspicious > 0);
     let sentinel = profile.sentinel();
     let kind = survey.kind(column, profile);

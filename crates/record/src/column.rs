@@ -129,9 +129,12 @@ impl Column {
         ArgumentError::finite("to", to)?;
         let range = to - from;
         if range.is_nan() || range < 0.0 || range == f64::INFINITY {
-            return Err(
-                ArgumentError::new("range", format!("{from} to {to}"), "a finite range, `from` below `to`").into()
-            );
+            return Err(ArgumentError::new(
+                "range",
+                format!("{from:?} to {to:?}"),
+                "a range of finite width, `from` below `to`",
+            )
+            .into());
         }
         Ok(Self {
             range: Some(range),

@@ -81,6 +81,7 @@ mod specials;
 mod stretches;
 mod time;
 mod waiting;
+mod whole;
 mod wire;
 
 pub use aggregate::Aggregate;
@@ -98,6 +99,7 @@ pub use recorder::Recorder;
 pub use scan::BlockReader;
 pub use schema::{MAX_CELLS, ROWS_PER_BLOCK, Schema, TimeBase, TimeFormat};
 pub use stretches::Stretch;
+pub use whole::WholeAggregate;
 
 /// The programs of `docs/record.md`, which are run as tests.
 #[cfg(doctest)]

@@ -4,7 +4,9 @@ use crate::aggregate::Aggregate;
 use crate::block::Block;
 use crate::blocks::Blocks;
 use crate::error::Error;
+use crate::integers::Integers;
 use crate::playback::Playback;
+use crate::whole::WholeAggregate;
 use fewbits_block_codec::ArgumentError;
 use std::collections::BTreeMap;
 use std::io::{Read, Seek};
@@ -19,6 +21,9 @@ pub struct Stretch {
     pub rows: u64,
     /// One aggregate per requested column, in the order of the request.
     pub columns: Vec<Aggregate>,
+    /// Of the requested columns of whole numbers of 64 bits ([`Column::integers`](crate::Column::integers)), whose values are codes, the
+    /// aggregate of the numbers; `None` for the others.
+    pub wholes: Vec<Option<WholeAggregate>>,
 }
 
 /// Stretches by number.
@@ -26,19 +31,29 @@ struct Stretches {
     every: i64,
     ticks: (i64, i64),
     chosen: Vec<usize>,
+    /// How chosen columns code whole numbers.
+    integers: Vec<Option<Integers>>,
     found: BTreeMap<i64, Stretch>,
 }
 
 impl Stretches {
     fn at(&mut self, number: i64) -> &mut Stretch {
         let Self {
-            every, chosen, found, ..
+            every,
+            chosen,
+            integers,
+            found,
+            ..
         } = self;
         found.entry(number).or_insert_with(|| Stretch {
             // The first stretch may begin before the smallest tick.
             tick: number.saturating_mul(*every),
             rows: 0,
             columns: vec![Aggregate::default(); chosen.len()],
+            wholes: integers
+                .iter()
+                .map(|integers| integers.map(|_| WholeAggregate::default()))
+                .collect(),
         })
     }
 
@@ -50,16 +65,20 @@ impl Stretches {
     }
 
     fn add(&mut self, block: &Block) {
-        let chosen = self.chosen.clone();
+        let (chosen, integers) = (self.chosen.clone(), self.integers.clone());
         for (row, tick) in block.ticks.iter().enumerate() {
             if *tick < self.ticks.0 || *tick > self.ticks.1 {
                 continue;
             }
             let stretch = self.at(tick.div_euclid(self.every));
             stretch.rows += 1;
-            for (aggregate, column) in stretch.columns.iter_mut().zip(&chosen) {
-                if let Some(value) = block.columns[*column][row] {
-                    aggregate.add(value);
+            for (i, column) in chosen.iter().enumerate() {
+                let Some(value) = block.columns[*column][row] else {
+                    continue;
+                };
+                match (&mut stretch.wholes[i], integers[i]) {
+                    (Some(whole), Some(integers)) => whole.add(integers.number(value)),
+                    _ => stretch.columns[i].add(value),
                 }
             }
         }
@@ -69,7 +88,8 @@ impl Stretches {
 impl<R: Read + Seek> Playback<R> {
     /// Aggregates of the requested columns over stretches of `every` ticks, which begin at multiples of it, in the order of time. Stretches
     /// without rows are left out. Only rows with ticks in `from..=to` count. A block that lies in one stretch is not decoded if the index
-    /// has its aggregates ([`BlockInfo::aggregates`](crate::BlockInfo::aggregates)). `damaged` is told each part that cannot be read; the
+    /// has its aggregates ([`BlockInfo::aggregates`](crate::BlockInfo::aggregates)), and no requested column has whole numbers of 64 bits: the
+    /// index has the aggregates of their codes. `damaged` is told each part that cannot be read; the
     /// rest counts.
     ///
     /// # Errors
@@ -82,10 +102,14 @@ impl<R: Read + Seek> Playback<R> {
     ) -> Result<Vec<Stretch>, Error> {
         let length = i64::try_from(every).ok().filter(|every| *every > 0);
         let length = length.ok_or_else(|| ArgumentError::new("every", every, "1 to 2^63 - 1 ticks"))?;
+        let columns = self.header.schema.columns();
+        let integers: Vec<_> = self.chosen.iter().map(|column| columns[*column].integers()).collect();
+        let is_indexed = integers.iter().all(Option::is_none);
         let mut stretches = Stretches {
             every: length,
             ticks: (from, to),
             chosen: self.chosen.clone(),
+            integers,
             found: BTreeMap::new(),
         };
         let tolerance = i64::try_from(self.header.schema.time.tolerance()).unwrap_or(i64::MAX);
@@ -93,7 +117,9 @@ impl<R: Read + Seek> Playback<R> {
         loop {
             // The ticks of a reader may differ from those of the index by the tolerance.
             let wide = |(first, last): (i64, i64)| (first.saturating_sub(tolerance), last.saturating_add(tolerance));
-            while let Some((entry, aggregates)) = blocks.known(|ticks| stretches.of_all(wide(ticks)).is_some())? {
+            while let Some((entry, aggregates)) =
+                blocks.known(|ticks| is_indexed && stretches.of_all(wide(ticks)).is_some())?
+            {
                 let Some(number) = stretches.of_all(wide(entry)) else {
                     break;
                 };

@@ -304,6 +304,13 @@ pub(crate) fn compact_of_day(text: &str) -> Option<(i64, i128, bool, &str)> {
     Some((part(0)? * 3600 + minutes * 60 + seconds, parts, seconds == 60, rest))
 }
 
+/// A time of day of six digits, with decimals or without, as `213000.50`.
+pub(crate) fn of_digits(text: &str) -> Option<(i64, i128)> {
+    let count = text.bytes().take_while(u8::is_ascii_digit).count();
+    let (second, parts, leap, rest) = compact_of_day(text).filter(|_| count == 6)?;
+    (!leap && second < 86_400 && rest.is_empty()).then_some((second, parts))
+}
+
 /// A date with words, with its parts in the order of ISO 8601: `Tue, 05 Mar 2024 21:30:00 GMT`, `Mar 5, 2024 9:30 PM`.
 fn arranged(text: &str) -> Option<String> {
     if !text.bytes().any(|c| c.is_ascii_alphabetic()) {

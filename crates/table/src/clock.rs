@@ -5,7 +5,7 @@ use crate::column::{Column, Kind};
 use crate::days::{by_name, may_be_days, may_be_julian};
 use crate::dialect::Dialect;
 use crate::error::Error;
-use crate::guess;
+use crate::guess::{self, Doubt};
 use crate::interval;
 use crate::named::{NAMES, OF_DAY, is_exact_name, is_time_name};
 use crate::parts::{calendar, monthly, of_day_parts, parts};
@@ -138,7 +138,27 @@ pub(crate) fn guess(
             .position(|column| is_time_name(&column.own_name))
             .filter(|_| !is_certain)
     };
-    exact.or_else(like).map(|column| vec![column])
+    exact
+        .or_else(like)
+        .or_else(|| by_unit(columns, samples))
+        .map(|column| vec![column])
+}
+
+/// The first column, if it alone states a unit of time and its numbers increase, as `Source [Second]` of an oscilloscope.
+fn by_unit(columns: &[Column], samples: &[&[String]]) -> Option<usize> {
+    let is_stated = |column: &Column| {
+        interval::is_stated(&column.own_name) || interval::of_name(&format!("t [{}]", column.unit)).is_some()
+    };
+    let increases = |sample: &[String]| {
+        let numbers: Option<Vec<f64>> = sample
+            .iter()
+            .map(|cell| cell.replacen(',', ".", 1).parse().ok())
+            .collect();
+        numbers.is_some_and(|numbers| numbers.len() >= 2 && numbers.is_sorted_by(|a, b| a < b))
+    };
+    let (first, others) = columns.split_first()?;
+    let is_it = is_stated(first) && !others.iter().any(is_stated) && increases(samples.first()?);
+    is_it.then_some(0)
 }
 
 /// The offset that a name states, as `Date Time, GMT-07:00` and `Time (UTC +1)`.
@@ -153,11 +173,7 @@ fn offset_in(name: &str) -> Option<String> {
 }
 
 /// How times of these columns are written, by what is said and by a sample of their cells (joined by a space).
-pub(crate) fn clock(
-    names: &[&str],
-    sample: &[String],
-    dialect: &mut Dialect,
-) -> Result<Clock, Result<Error, (usize, Problem)>> {
+pub(crate) fn clock(names: &[&str], sample: &[String], dialect: &mut Dialect) -> Result<Clock, Refused> {
     let cells: Vec<&str> = sample.iter().map(String::as_str).collect();
     let mut zone_text = dialect.time_zone.clone();
     let is_epw = dialect.format.as_deref() == Some("EPW");
@@ -179,7 +195,7 @@ pub(crate) fn clock(
             Some(other) => {
                 let expected = "`dmy`, `mdy`, `ymd`, the unit of numbers `s`, `ms`, `us`, `ns`, `min`, `h` or `d`, numbers of days or \
                                 seconds as of `excel`, `matlab`, `mjd`, `jd` or `labview`, or a format as '%d.%m.%Y %H:%M:%S'";
-                return Err(Ok(Error::option("--time-format", other, expected)));
+                return Err(Refused::Option(Error::option("--time-format", other, expected)));
             }
             None => by_name(names, &cells).map_or_else(|| majority(&cells), Ok)?,
         }
@@ -198,10 +214,10 @@ pub(crate) fn clock(
         });
     }
     if syntax == Syntax::Number(Unit::Seconds) && dialect.time_format.is_none() && may_be_days(names, &cells) {
-        return Err(Err((0, written::DAYS)));
+        return Err(Refused::Cell(0, written::DAYS));
     }
     if syntax == Syntax::Number(Unit::Seconds) && dialect.time_format.is_none() && may_be_julian(names, &cells) {
-        return Err(Err((0, written::JULIAN)));
+        return Err(Refused::Cell(0, written::JULIAN));
     }
     let has_offset = match &syntax {
         Syntax::Date(order) => cells.iter().any(|cell| guess::has_offset(cell, *order)),
@@ -253,8 +269,17 @@ pub(crate) fn clock(
     })
 }
 
-/// How times are written, or the refusal: an error, or the row of the sample and its problem.
-type Found = Result<Syntax, Result<Error, (usize, Problem)>>;
+/// Why cells are not taken for times.
+pub(crate) enum Refused {
+    /// An option is not understood.
+    Option(Error),
+    /// The row of the sample, and its problem.
+    Cell(usize, Problem),
+    Doubt(Doubt),
+}
+
+/// How times are written, or the refusal.
+type Found = Result<Syntax, Refused>;
 
 /// Numbers with the unit that the name of their column states. Times since 1970 keep that of their size if the name states seconds.
 fn with_stated_unit(syntax: Syntax, names: &[&str], cells: &[&str], dialect: &mut Dialect) -> Syntax {
@@ -311,13 +336,14 @@ fn majority(cells: &[&str]) -> Found {
     });
     match found {
         Some(Ok(syntax)) => Ok(syntax),
-        Some(Err(problem)) => Err(Err((0, problem))),
+        Some(Err(doubt)) => Err(Refused::Doubt(doubt)),
+        None if cells.iter().all(|cell| interval::spelled(cell).is_some()) => Ok(Syntax::Spelled),
         None => {
             let first = cells
                 .iter()
                 .position(|cell| guess::detect(&[cell]).is_none())
                 .unwrap_or(0);
-            Err(Err((first, written::NO_TIME)))
+            Err(Refused::Cell(first, written::NO_TIME))
         }
     }
 }

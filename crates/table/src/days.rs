@@ -1,7 +1,9 @@
-//! Whether numbers are likely days: of a year, of spreadsheets, or Julian dates.
+//! Whether numbers are likely days: of a year, of spreadsheets, or Julian dates; times as numbers of units.
 
 use crate::civil;
-use crate::written::{Order, Syntax};
+use crate::interval;
+use crate::time::{SECOND, Time, Unit};
+use crate::written::{Clock, NO_TIME, Order, Problem, Syntax};
 
 fn has_date_name(names: &[&str]) -> bool {
     let is_date = |name: &&str| {
@@ -13,11 +15,33 @@ fn has_date_name(names: &[&str]) -> bool {
     names.len() == 1 && names.iter().any(is_date)
 }
 
-/// A year and the day of the year as one number, which only the name of the column tells from a count.
+/// A year and the day of the year, or a time of day, as one number, which only the name of the column tells from a count.
 pub(crate) fn by_name(names: &[&str], cells: &[&str]) -> Option<Syntax> {
     let is_day =
         |cell: &&str| cell.len() == 7 && civil::written(cell, Order::Ymd).is_some_and(|found| found.date.is_ok());
-    (has_date_name(names) && !cells.is_empty() && cells.iter().all(is_day)).then_some(Syntax::Date(Order::Ymd))
+    if cells.is_empty() {
+        None
+    } else if has_date_name(names) && cells.iter().all(is_day) {
+        Some(Syntax::Date(Order::Ymd))
+    } else {
+        (is_of_day_name(names) && cells.iter().all(|cell| civil::of_digits(cell).is_some())).then_some(Syntax::OfDay)
+    }
+}
+
+/// Whether a column is named as one of times of day without marks, as receivers of satellites write them: `213000.50`.
+fn is_of_day_name(names: &[&str]) -> bool {
+    const WORDS: [&str; 9] = [
+        "utc",
+        "utc_time",
+        "utc time",
+        "time_utc",
+        "utctime",
+        "gps_time",
+        "gpstime",
+        "hhmmss",
+        "hhmmss.ss",
+    ];
+    matches!(names, [name] if WORDS.contains(&name.to_lowercase().as_str()))
 }
 
 /// Whether a column is named as one of Julian dates and has numbers of their size.
@@ -50,4 +74,22 @@ pub(crate) fn may_be_days(names: &[&str], cells: &[&str]) -> bool {
     let is_share = |cell: &&str| cell.split_once('.').is_some_and(|(_, places)| places.len() >= 5);
     (has_date_name(names) && within(20_000.0, 80_000.0))
         || (names.len() == 1 && cells.iter().any(is_share) && within(36_500.0, 55_000.0))
+}
+
+impl Clock {
+    /// A number of units of so many seconds since a zero.
+    pub(crate) fn since(&self, text: &str, unit: i64, zero: i64) -> Result<Time, Problem> {
+        let count = self.number(text, Unit::Seconds)?;
+        let size = count.0.checked_mul(i128::from(unit)).ok_or(NO_TIME)?;
+        Ok(Time(size.checked_add(i128::from(zero) * SECOND).ok_or(NO_TIME)?))
+    }
+
+    /// A number with its unit behind it.
+    pub(crate) fn spelled(&self, text: &str) -> Result<Time, Problem> {
+        let (number, unit) = interval::spelled(text).ok_or(NO_TIME)?;
+        match interval::part(unit) {
+            Some(part) => self.number(number, part),
+            None => self.since(number, interval::seconds(unit).unwrap_or(1), 0),
+        }
+    }
 }

@@ -23,7 +23,7 @@ fn look(cell: &str, decimal_comma: bool) -> Look {
     };
     if missing::is_usual(cell, true) {
         Look::Missing
-    } else if number::parse(cell.as_bytes(), syntax).map_or_else(|(why, _)| why != number::NO_NUMBER, |_| true) {
+    } else if number::read(cell.as_bytes(), syntax) != Err(number::Fault::NoNumber) {
         // A number that no double holds is one all the same: not a name, and refused when it is read.
         Look::Number
     } else if guess::looks_like_time(cell) {

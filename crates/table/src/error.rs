@@ -58,6 +58,19 @@ pub enum Error {
         /// What to do.
         mend: String,
     },
+    /// The dates of a column may have the day or the month first, by the first rows. All rows may decide:
+    /// [`Profile::day_order`](crate::Profile::day_order).
+    #[error("{place}, column `{column}`: `{cell}` may have the day or the month first: {mend}")]
+    DayOrMonth {
+        /// Where.
+        place: Place,
+        /// Name of the column.
+        column: String,
+        /// The cell, at most 80 characters of it.
+        cell: String,
+        /// What to do.
+        mend: String,
+    },
     /// There is no such column.
     #[error("no column `{column}`: there are {existing}")]
     NoColumn {
@@ -141,13 +154,13 @@ impl Error {
     ///
     /// [`Profile::day_order`]: crate::Profile::day_order
     pub fn is_day_or_month(&self) -> bool {
-        matches!(self, Self::Cell { problem, .. } if *problem == crate::civil::AMBIGUOUS.0)
+        matches!(self, Self::DayOrMonth { .. })
     }
 
     /// Where the fault is, if it is that of one row: what [`Dialect::skip_bad`](crate::Dialect::skip_bad) may leave out.
     pub fn place(&self) -> Option<Place> {
         match self {
-            Self::Line { place, .. } | Self::Cell { place, .. } => Some(*place),
+            Self::Line { place, .. } | Self::Cell { place, .. } | Self::DayOrMonth { place, .. } => Some(*place),
             _ => None,
         }
     }

@@ -1,12 +1,29 @@
 //! How the times of a column are written, by its cells.
 
-use crate::civil::YEAR;
 use crate::civil::{self, Zone, digits, is_compact};
 use crate::time::{Scale, Unit};
-use crate::written::{AMBIGUOUS, Clock, NAMED_ZONE, Order, Problem, Syntax};
+use crate::written::{Clock, NAMED_ZONE, Order, Problem, Syntax};
+
+/// What cells leave open.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Doubt {
+    /// The day or the month may stand first.
+    DayOrMonth,
+    /// The year may stand first or last.
+    Year,
+}
+
+impl Doubt {
+    pub(crate) fn problem(self) -> Problem {
+        match self {
+            Self::DayOrMonth => civil::AMBIGUOUS,
+            Self::Year => civil::YEAR,
+        }
+    }
+}
 
 /// How cells of a column are written, if all are times; an ambiguity if the day or the month may stand first.
-pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Problem>> {
+pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Doubt>> {
     let clock = |syntax: Syntax, scale| Clock {
         syntax,
         zone: None,
@@ -43,7 +60,7 @@ pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Problem>> {
     }
     let (dmy, mdy) = (all(Syntax::Date(Order::Dmy)), all(Syntax::Date(Order::Mdy)));
     if (dmy || mdy) && may_have_year_first(cells) {
-        return Some(Err(YEAR));
+        return Some(Err(Doubt::Year));
     }
     let is_dotted = cells
         .iter()
@@ -56,7 +73,7 @@ pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Problem>> {
     });
     match (dmy, mdy) {
         (true, true) if is_dotted || is_worded => Some(Ok(Syntax::Date(Order::Dmy))),
-        (true, true) => Some(Err(AMBIGUOUS)),
+        (true, true) => Some(Err(Doubt::DayOrMonth)),
         (true, false) => Some(Ok(Syntax::Date(Order::Dmy))),
         (false, true) => Some(Ok(Syntax::Date(Order::Mdy))),
         (false, false) => all(Syntax::Date(Order::Ymd)).then_some(Ok(Syntax::Date(Order::Ymd))),
@@ -97,5 +114,7 @@ pub(crate) fn looks_like_time(text: &str) -> bool {
     !(text.len() == 7 && text.as_bytes()[4] == b'-')
         && text.bytes().any(|c| c.is_ascii_digit())
         && text.starts_with(|c: char| c.is_ascii_alphanumeric())
+        // Behind the name of a day or a month stand further words.
+        && (text.as_bytes()[0].is_ascii_digit() || text.contains([' ', ',', '\t']))
         && !matches!(detect(&[text]), None | Some(Ok(Syntax::Number(_))))
 }

@@ -56,6 +56,24 @@ pub(crate) fn of_name(name: &str) -> Option<(&'static str, &str)> {
     Some((*unit, rest))
 }
 
+/// The number and the unit of a time that is spelled with one, as `1.5 sec` and `3 min`.
+pub(crate) fn spelled(cell: &str) -> Option<(&str, &'static str)> {
+    let (unit, rest) = of_name(cell)?;
+    let number = rest.trim_end();
+    number
+        .parse::<f64>()
+        .is_ok_and(f64::is_finite)
+        .then_some((number, unit))
+}
+
+/// Whether a name states a unit of time in brackets, or is the word for one that has no other meaning.
+pub(crate) fn is_stated(name: &str) -> bool {
+    let (begin, end) = last_word(name);
+    let in_brackets = name[..begin].ends_with(['(', '[']);
+    let is_word = || begin == 0 && (end >= 4 || matches!(&*name.to_lowercase(), "sec" | "ms" | "us" | "µs" | "ns"));
+    of_name(name).is_some() && (in_brackets || is_word())
+}
+
 /// The seconds of a unit that is longer than a second.
 pub(crate) fn seconds(unit: &str) -> Option<i64> {
     match unit {

@@ -43,6 +43,7 @@
 #[cfg(feature = "parquet")]
 mod arrow;
 mod calendar;
+mod cell;
 mod civil;
 mod clock;
 mod column;
@@ -50,11 +51,13 @@ mod days;
 mod delimiter;
 mod detect;
 mod dialect;
+mod early;
 mod ends;
 mod error;
 mod extent;
 mod guess;
 mod head;
+mod hint;
 mod interval;
 mod json;
 mod known;
@@ -74,12 +77,14 @@ mod profile;
 mod quick;
 mod read;
 mod readings;
+mod seen;
 mod source;
 mod survey;
 mod table;
 mod time;
 mod timing;
 mod wide;
+mod words;
 mod written;
 mod zones;
 

@@ -1,10 +1,21 @@
 //! What points and commas in numbers mean, by the first rows.
 
+use crate::number::SPACES;
+
 /// Whether numbers have decimal commas without a doubt: a comma before other than three digits, and no decimal points.
 pub(crate) fn has_decimal_commas(rows: &[(u64, Vec<String>)]) -> bool {
     let (mut certain, mut points) = (false, false);
     for cell in rows.iter().flat_map(|(_, cells)| cells) {
         let size = without_exponent(cell.trim_start_matches(['-', '+', '\u{2212}']));
+        // Spaces between groups of digits, as of French spreadsheets, say nothing of decimals.
+        let is_spaced = |c: char| c == ' ' || SPACES.contains(&c);
+        let bare;
+        let size = if size.starts_with(|c: char| c.is_ascii_digit()) && size.contains(is_spaced) {
+            bare = size.replace(is_spaced, "");
+            bare.as_str()
+        } else {
+            size
+        };
         let is_number = size.bytes().all(|c| c.is_ascii_digit() || matches!(c, b',' | b'.')) && !size.is_empty();
         match (size.split_once(','), is_number) {
             (Some((whole, places)), true) if !whole.contains(',') && !size.contains('.') => {

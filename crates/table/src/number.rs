@@ -1,5 +1,7 @@
 //! Numbers as loggers write them. What a double cannot hold is refused, never rounded in silence.
 
+use crate::hint::hint;
+
 /// How numbers are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Syntax {
@@ -43,9 +45,36 @@ pub(crate) const TENS: [f64; 23] = [
     1e21, 1e22,
 ];
 
+/// Why a text is not a number that can be kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Fault {
+    NoNumber,
+    TooLarge,
+    TooSmall,
+    TooLong,
+}
+
+impl Fault {
+    /// The problem with the cell, and what would mend it.
+    fn problem(self, text: &[u8]) -> Problem {
+        match self {
+            Self::NoNumber => (NO_NUMBER, hint(&String::from_utf8_lossy(text))),
+            Self::TooLarge => TOO_LARGE,
+            Self::TooSmall => TOO_SMALL,
+            Self::TooLong => TOO_LONG,
+        }
+    }
+}
+
 /// Parses a trimmed cell that is not empty.
 #[inline]
 pub(crate) fn parse(text: &[u8], syntax: Syntax) -> Result<Number, Problem> {
+    read(text, syntax).map_err(|fault| fault.problem(text))
+}
+
+/// As [`parse`], without the words for what is wrong.
+#[inline]
+pub(crate) fn read(text: &[u8], syntax: Syntax) -> Result<Number, Fault> {
     let (negative, digits) = match text {
         [b'-', rest @ ..] => (true, rest),
         [b'+', rest @ ..] => (false, rest),
@@ -94,8 +123,12 @@ fn long(text: &[u8]) -> Option<Number> {
 
 /// Everything that is not a short plain number.
 #[cold]
-fn slowly(text: &[u8], syntax: Syntax) -> Result<Number, Problem> {
-    let text = std::str::from_utf8(text).map_err(|_| no_number(text))?;
+fn slowly(text: &[u8], syntax: Syntax) -> Result<Number, Fault> {
+    // Of words, only those for infinities and what is no number are numbers.
+    if matches!(text.first(), Some(first) if first.is_ascii_alphabetic() && !b"nNiI".contains(first)) {
+        return Err(Fault::NoNumber);
+    }
+    let text = std::str::from_utf8(text).map_err(|_| Fault::NoNumber)?;
     let mut plain: String = text.trim_matches(BLANKS).replace('\u{2212}', "-");
     if syntax.thousands == Some(b' ') {
         plain = plain.replace(SPACES, " ");
@@ -111,23 +144,22 @@ fn slowly(text: &[u8], syntax: Syntax) -> Result<Number, Problem> {
         plain = format!("{}{}", &plain[..1], rest.trim_start());
     }
     if let Some(mark) = syntax.thousands {
-        plain =
-            grouped(&plain, char::from(mark), char::from(syntax.decimal)).ok_or_else(|| no_number(text.as_bytes()))?;
+        plain = grouped(&plain, char::from(mark), char::from(syntax.decimal)).ok_or(Fault::NoNumber)?;
     }
     if syntax.decimal != b'.' {
         if plain.contains('.') {
-            return Err(no_number(text.as_bytes()));
+            return Err(Fault::NoNumber);
         }
         plain = plain.replacen(char::from(syntax.decimal), ".", 1);
     }
     if let Some(special) = special(&plain) {
         return Ok(Number::Double(special, 0));
     }
-    let value: f64 = plain.parse().map_err(|_| no_number(text.as_bytes()))?;
+    let value: f64 = plain.parse().map_err(|_| Fault::NoNumber)?;
     let size = plain.trim_start_matches(['-', '+']);
     let begins_with_word = size.starts_with(|c: char| c.is_ascii_alphabetic());
     if value.is_infinite() && !begins_with_word {
-        return Err(TOO_LARGE);
+        return Err(Fault::TooLarge);
     }
     if value == 0.0
         && size
@@ -135,7 +167,7 @@ fn slowly(text: &[u8], syntax: Syntax) -> Result<Number, Problem> {
             .next()
             .is_some_and(|digits| digits.contains(|c| matches!(c, '1'..='9')))
     {
-        return Err(TOO_SMALL);
+        return Err(Fault::TooSmall);
     }
     let (whole, places) = size.split_once('.').unwrap_or((size, ""));
     if size.contains(['e', 'E']) || begins_with_word || places.bytes().any(|c| c != b'0') {
@@ -149,17 +181,17 @@ fn slowly(text: &[u8], syntax: Syntax) -> Result<Number, Problem> {
         Some(exact) if value as i128 == exact => {
             Ok(Number::Double(value, u8::try_from(places.len()).unwrap_or(u8::MAX)))
         }
-        Some(exact) => i64::try_from(exact).map(Number::Whole).map_err(|_| TOO_LONG),
-        None => Err(TOO_LONG),
+        Some(exact) => i64::try_from(exact).map(Number::Whole).map_err(|_| Fault::TooLong),
+        None => Err(Fault::TooLong),
     }
 }
 
 /// Marks without ink at the ends of cells, as programs leave them: spaces of several kinds, and the mark of an encoding.
-const BLANKS: [char; 7] = [
+pub(crate) const BLANKS: [char; 7] = [
     '\u{a0}', '\u{202f}', '\u{2009}', '\u{200b}', '\u{feff}', '\u{b}', '\u{c}',
 ];
 /// Spaces between groups of digits that are no plain ones.
-const SPACES: [char; 3] = ['\u{a0}', '\u{202f}', '\u{2009}'];
+pub(crate) const SPACES: [char; 3] = ['\u{a0}', '\u{202f}', '\u{2009}'];
 
 /// A number with an exponent as of Fortran, `1.95D+01`, with that of others.
 fn fortran(text: &str) -> Option<String> {
@@ -179,7 +211,8 @@ fn special(text: &str) -> Option<f64> {
     })
 }
 
-/// The number without the marks between groups of three digits; `None` if a group has another length.
+/// The number without the marks between groups of digits: of three, or, as in India, of three at the end and of two before. `None` if a
+/// group has another length.
 fn grouped(text: &str, mark: char, decimal: char) -> Option<String> {
     if !text.contains(mark) {
         return Some(text.to_owned());
@@ -187,8 +220,15 @@ fn grouped(text: &str, mark: char, decimal: char) -> Option<String> {
     let (whole, rest) = text.split_once(decimal).unwrap_or((text, ""));
     let (sign, digits) = whole.split_at(usize::from(whole.starts_with(['-', '+'])));
     let groups: Vec<&str> = digits.split(mark).collect();
-    let whole_groups = groups.iter().skip(1).all(|group| group.len() == 3) && (1..=3).contains(&groups[0].len());
-    if !whole_groups || rest.contains(mark) {
+    let are_of = |groups: &[&str], length: usize| {
+        let (first, rest) = groups.split_first().unwrap_or((&"", &[]));
+        (1..=length).contains(&first.len()) && rest.iter().all(|group| group.len() == length)
+    };
+    let is_grouped = match groups.split_last() {
+        Some((last, before)) => are_of(&groups, 3) || (last.len() == 3 && are_of(before, 2)),
+        None => false,
+    };
+    if !is_grouped || rest.contains(mark) {
         return None;
     }
     let decimal = if rest.is_empty() {
@@ -197,98 +237,6 @@ fn grouped(text: &str, mark: char, decimal: char) -> Option<String> {
         format!("{decimal}{rest}")
     };
     Some(format!("{sign}{}{decimal}", groups.concat()))
-}
-
-/// The problem with a cell that is no number, with the option that its look suggests.
-fn no_number(text: &[u8]) -> Problem {
-    (NO_NUMBER, hint(&String::from_utf8_lossy(text)))
-}
-
-/// The option that the look of a cell suggests.
-pub(crate) fn hint(text: &str) -> &'static str {
-    let digits = text.bytes().filter(u8::is_ascii_digit).count();
-    let commas = text.bytes().filter(|c| *c == b',').count();
-    let points = text.bytes().filter(|c| *c == b'.').count();
-    let plain = text
-        .chars()
-        .all(|c| c.is_ascii_digit() || "+-.,'\u{2019}\u{2212} eE".contains(c));
-    let is_spaced = text.contains(SPACES) || text.split(' ').skip(1).any(|group| group.len() >= 3);
-    let is_grouped = is_spaced
-        && text
-            .chars()
-            .all(|c| c.is_ascii_digit() || SPACES.contains(&c) || "+-., ".contains(c));
-    if text.contains('\0') {
-        "the cell has NUL bytes, as after a loss of power: leave such lines out with --skip-bad 1 or more"
-    } else if digits == 0 {
-        "make it a gap with --missing, leave such lines out with --skip-bad, or the column with --without"
-    } else if is_grouped {
-        if commas == 1 && points == 0 {
-            "say --thousands ' ' --decimal ,"
-        } else {
-            "say --thousands ' '"
-        }
-    } else if text.contains(CURRENCIES) && !text.ends_with(CURRENCIES) {
-        "a sign in front of the number is not read: take it away, or leave the column out with --without"
-    } else if text.starts_with('(') && text.ends_with(')') {
-        "if brackets mean a negative number, write a minus; or leave the column out with --without"
-    } else if plain && digits > 1 && text.ends_with('-') {
-        "if a minus behind the number makes it negative, write it in front; or leave the column out with --without"
-    } else if plain && commas == 1 && points == 0 && text.len() - text.find(',').unwrap_or(0) == 4 {
-        "say --thousands , if these are groups of digits, or --decimal , (with --delimiter ';' or tab) if they are decimals"
-    } else if plain && commas == 1 && points == 0 {
-        "if it has a decimal comma, say --decimal , (and --delimiter ';' or tab)"
-    } else if plain && (commas > 1 || (commas == 1 && points == 1)) {
-        if text.rfind(',') > text.rfind('.') {
-            "say --decimal , --thousands ."
-        } else {
-            "say --thousands ,"
-        }
-    } else if plain && text.contains(['\'', '\u{2019}']) && !text.starts_with('\'') {
-        "say --thousands \"'\""
-    } else if text.bytes().all(|c| c.is_ascii_digit() || b"+-.,_".contains(&c)) && text.contains('_') {
-        "say --thousands _"
-    } else if plain && points > 2 {
-        "say --thousands and the mark between groups"
-    } else if text.ends_with('%') || text.ends_with(|c: char| c.is_alphabetic()) && !text.contains('x') {
-        "if a unit stands behind the number, say --strip-units"
-    } else if text.starts_with("0x") || text.starts_with("0X") {
-        "hexadecimal numbers are not read: convert the column, or leave it out with --without"
-    } else {
-        "mend the cell, name it with --missing, leave such lines out with --skip-bad, or the column with --without"
-    }
-}
-
-/// Signs that may stand before a number.
-const CURRENCIES: [char; 4] = ['$', '€', '£', '¥'];
-
-/// Whether a text is likely a number of another spelling, with groups, a decimal comma or a unit.
-pub(crate) fn looks_like_number(text: &str) -> bool {
-    let text = text
-        .strip_prefix('(')
-        .and_then(|text| text.strip_suffix(')'))
-        .unwrap_or(text);
-    let size = text
-        .trim_matches(BLANKS)
-        .trim_start_matches(['-', '+', '\'', '\u{2212}'])
-        .trim_start_matches(CURRENCIES)
-        .trim_start_matches(['-', ' ']);
-    if !size.starts_with(char::is_numeric) {
-        return false;
-    }
-    // A minus behind the number, fractions and digits of other scripts too.
-    let hexadecimal = size.strip_prefix("0x").or(size.strip_prefix("0X"));
-    let is_plain = size
-        .strip_suffix('-')
-        .unwrap_or(size)
-        .chars()
-        .all(|c| c.is_numeric() || ".,'_\u{2019} ".contains(c) || SPACES.contains(&c))
-        || hexadecimal.is_some_and(|digits| digits.bytes().all(|c| c.is_ascii_hexdigit()));
-    let has_unit = without_unit(size).is_some_and(|(number, unit)| {
-        let is_spaced = size.as_bytes().get(number.len()) == Some(&b' ');
-        number.parse::<f64>().is_ok()
-            && (unit.starts_with(['%', '°', 'µ']) || (is_spaced && unit.len() <= 6 && !unit.contains(' ')))
-    });
-    is_plain || has_unit
 }
 
 /// The number in front of a unit, as `19.75` of `19.75 °C`.
@@ -364,6 +312,12 @@ mod tests {
         assert_eq!(of("1,721,992,142.283", b'.', Some(b',')), Some(1_721_992_142.283));
         assert_eq!(of("-1 234.5", b'.', Some(b' ')), Some(-1234.5));
         assert_eq!(of("1,72", b'.', Some(b',')), None);
+        // Lakhs and crores.
+        assert_eq!(of("1,23,456.75", b'.', Some(b',')), Some(123_456.75));
+        assert_eq!(of("-12,34,56,789", b'.', Some(b',')), Some(-123_456_789.0));
+        for text in ["1,234,56,789", "1,23,45", "123,45,678", "1,2,345", ",345", "1,,345"] {
+            assert_eq!(of(text, b'.', Some(b',')), None, "{text}");
+        }
         assert_eq!(of("19.75", b',', None), None);
         assert_eq!(value("\u{2212}3.5"), Some(-3.5));
         assert_eq!(value("+ 0.081"), Some(0.081));

@@ -378,5 +378,6 @@ fn first_profiles(head: &Head, rows: &Rows, columns: &[Column], dialect: &Dialec
             _ => {}
         }
     }
+    profiles.iter_mut().for_each(Profile::settle);
     profiles
 }

@@ -1,12 +1,12 @@
 //! Parquet files as tables: every type of number, decimals, times, booleans, dictionaries and text; others are named when they are asked for.
 
 use crate::arrow::{self, Decoded};
+use crate::cell::{Meaning, push_cell};
 use crate::column::{Batch, Cells, Column, Kind};
 use crate::dialect::Dialect;
 use crate::error::{Error, Place, printable};
 use crate::names;
 use crate::profile::Profile;
-use crate::read::{Meaning, push_cell};
 use crate::survey::{Survey, WATCHED};
 use crate::table::Table;
 use crate::time::{Scale, Time};
@@ -233,7 +233,6 @@ impl Table {
                         strips: self.dialect.strip_units,
                         clock: self.clocks[*column].as_ref(),
                         kind: self.columns[*column].kind,
-                        is_fixed: self.is_fixed[*column],
                         unit: self.profiles[*column].unit.as_deref(),
                     };
                     push_cell(into, rows.text(*column).trim(), &meaning, &mut self.words[*column])
@@ -367,6 +366,7 @@ fn add_all(profile: &mut Profile, decoded: &Decoded, dialect: &Dialect, (name, o
                 let text = text.as_deref().unwrap_or_default().trim();
                 profile.add(text, place, crate::number::Syntax::default(), &gaps, dialect.strip_units);
             }
+            profile.settle();
         }
         Decoded::Cells(cells) => {
             for row in 0..cells.len() {

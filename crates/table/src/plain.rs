@@ -18,7 +18,13 @@ impl Cell {
     /// The text of the cell, which is ASCII.
     #[inline]
     pub(crate) fn text(self, line: &[u8]) -> &str {
-        std::str::from_utf8(&line[self.from as usize..self.to as usize]).unwrap_or_default()
+        std::str::from_utf8(self.bytes(line)).unwrap_or_default()
+    }
+
+    /// The bytes of the cell.
+    #[inline]
+    pub(crate) fn bytes(self, line: &[u8]) -> &[u8] {
+        &line[self.from as usize..self.to as usize]
     }
 
     pub(crate) fn is_empty(self) -> bool {

@@ -1,13 +1,20 @@
 //! What the cells of a column are, counted over rows: its kind, its range, its gaps by spelling, and what looks wrong.
 
 use crate::column::{Kind, MAX_WORDS};
+use crate::early::Early;
 use crate::ends::{self, End, Sentinel};
 use crate::error::Place;
 use crate::extent::{Extent, FewCells};
 use crate::guess;
+use crate::hint::looks_like_number;
 use crate::missing::{self, Spellings};
 use crate::number::{self, Number};
-use std::collections::{BTreeMap, HashMap};
+use crate::quick;
+use crate::seen::{Class, Seen, is_candidate};
+use std::collections::BTreeMap;
+
+#[cfg(feature = "parquet")]
+mod typed;
 
 /// Number of cells that are kept to find out how times are written.
 const SAMPLE: usize = 64;
@@ -51,19 +58,7 @@ pub struct Profile {
     /// The first cell that is no number.
     pub first_text: Option<(Place, String)>,
     pub(crate) sample: Vec<String>,
-}
-
-/// Distinct texts of the numbers that come first.
-#[derive(Debug, Clone)]
-enum Early {
-    Words(HashMap<String, u64>, String),
-    TooMany,
-}
-
-impl Default for Early {
-    fn default() -> Self {
-        Self::Words(HashMap::new(), String::new())
-    }
+    seen: Seen,
 }
 
 /// Words of booleans.
@@ -90,14 +85,25 @@ impl Profile {
 
     /// Adds a trimmed cell.
     pub(crate) fn add(&mut self, cell: &str, place: Place, syntax: number::Syntax, gaps: &Spellings, strips: bool) {
-        if cell.is_empty() || (!gaps.is_empty() && gaps.has_text(cell)) {
+        if cell.is_empty() {
             self.gap(cell);
             return;
         }
+        let is_candidate = is_candidate(cell);
+        if is_candidate && self.sample.len() == SAMPLE && self.seen.count(cell) {
+            return;
+        }
+        if !gaps.is_empty() && gaps.has_text(cell) {
+            self.gap(cell);
+            if is_candidate {
+                self.seen.add(cell, Class::Gap);
+            }
+            return;
+        }
         self.keep(cell);
-        let parsed = number::parse(cell.as_bytes(), syntax);
+        let parsed = number::read(cell.as_bytes(), syntax);
         let parsed = match (&parsed, number::without_unit(cell).filter(|_| strips)) {
-            (Err(_), Some((number, unit))) => match number::parse(number.as_bytes(), syntax) {
+            (Err(_), Some((number, unit))) => match number::read(number.as_bytes(), syntax) {
                 Ok(_) if self.unit.get_or_insert_with(|| unit.to_owned()) != unit => parsed,
                 found => found,
             },
@@ -111,13 +117,42 @@ impl Profile {
                 self.extend(whole as f64);
                 self.extend_whole(whole);
             }
-            Err(_) => self.text(cell, place),
+            Err(_) => {
+                let class = self.text(cell, place);
+                if let Some(class) = class.filter(|_| is_candidate) {
+                    self.seen.add(cell, class);
+                }
+            }
         }
     }
 
-    /// Adds a cell that is a short number.
+    /// Counts what was seen before and came again: to be called before the counts are used.
+    pub(crate) fn settle(&mut self) {
+        for (word, class, count) in self.seen.take() {
+            match class {
+                Class::Gap => {
+                    *self.missing.entry(word).or_default() += count;
+                    continue;
+                }
+                Class::Boolean => self.booleans += count,
+                Class::Fault => self.faults += count,
+                Class::Text => self.texts += count,
+            }
+            if let Some(known) = self.words.get_mut(&word) {
+                *known += count;
+            }
+        }
+    }
+
+    /// Adds a cell of ASCII that is a short number.
     #[inline]
-    pub(crate) fn add_number(&mut self, value: f64, decimals: u8, cell: &str, gaps: &Spellings) {
+    pub(crate) fn add_number(&mut self, value: f64, decimals: u8, cell: &[u8], gaps: &Spellings) {
+        let has_early = matches!(self.early, Early::Words(..));
+        if !has_early && self.sample.len() == SAMPLE && self.texts == 0 && gaps.is_empty() {
+            self.number(value, decimals, "");
+            return;
+        }
+        let cell = std::str::from_utf8(cell).unwrap_or_default();
         if !gaps.is_empty() && gaps.has_text(cell) {
             self.gap(cell);
             return;
@@ -130,14 +165,26 @@ impl Profile {
         }
     }
 
-    /// Adds a cell that is a time with a date.
-    pub(crate) fn add_written_time(&mut self, cell: &str, gaps: &Spellings) {
-        if !gaps.is_empty() && gaps.has_text(cell) {
-            self.gap(cell);
-            return;
+    /// Adds a cell of ASCII that is a time in a usual spelling.
+    pub(crate) fn add_written_time(&mut self, cell: &[u8], gaps: &Spellings) {
+        if self.sample.len() < SAMPLE || !gaps.is_empty() {
+            let text = std::str::from_utf8(cell).unwrap_or_default();
+            if gaps.has_text(text) {
+                self.gap(text);
+                return;
+            }
+            self.keep(text);
         }
-        self.keep(cell);
         self.times += 1;
+        if let Some((first, second)) = quick::first_two(cell) {
+            self.decide(first, second);
+        }
+    }
+
+    /// Notes what the first two numbers of a date say of their order.
+    fn decide(&mut self, first: i64, second: i64) {
+        self.days.0 |= (13..=31).contains(&first);
+        self.days.1 |= (13..=31).contains(&second);
     }
 
     fn gap(&mut self, cell: &str) {
@@ -165,17 +212,8 @@ impl Profile {
         // Numbers may be words among words: `A1`, `7`, `B2`.
         if self.texts > 0 {
             self.word(cell);
-        } else if let Early::Words(words, last) = &mut self.early
-            && last != cell
-        {
-            cell.clone_into(last);
-            if words.len() > MAX_WORDS {
-                self.early = Early::TooMany;
-            } else if let Some(count) = words.get_mut(cell) {
-                *count += 1;
-            } else {
-                words.insert(cell.to_owned(), 1);
-            }
+        } else {
+            self.early.add(cell);
         }
     }
 
@@ -200,84 +238,39 @@ impl Profile {
         }
     }
 
-    fn text(&mut self, cell: &str, place: Place) {
+    /// Counts a cell that is no number. What it is; `None` if it is a time.
+    fn text(&mut self, cell: &str, place: Place) -> Option<Class> {
         if missing::is_usual(cell, false) {
             self.gap(cell);
-            return;
+            return Some(Class::Gap);
         }
-        if boolean(cell).is_some() {
+        let class = if boolean(cell).is_some() {
             self.booleans += 1;
+            Class::Boolean
         } else if missing::is_usual(cell, true) {
             // A gap among numbers, a word among words.
             self.gap(cell);
-            return;
+            return Some(Class::Gap);
         } else if guess::looks_like_time(cell) {
             self.times += 1;
             if let Some(([first, second, _], _)) = guess::three(cell) {
-                self.days.0 |= (13..=31).contains(&first);
-                self.days.1 |= (13..=31).contains(&second);
+                self.decide(first, second);
             }
-            return;
-        } else if number::looks_like_number(cell) {
+            return None;
+        } else if looks_like_number(cell) {
             self.faults += 1;
+            Class::Fault
         } else {
             self.texts += 1;
             match std::mem::replace(&mut self.early, Early::TooMany) {
-                Early::Words(words, _) => self.words.extend(words),
+                Early::Words(words) => self.words.extend(words.counted()),
                 Early::TooMany => self.has_too_many |= self.texts == 1,
             }
-        }
+            Class::Text
+        };
         self.first_text.get_or_insert_with(|| (place, cell.to_owned()));
         self.word(cell);
-    }
-
-    /// Adds a cell that is a double.
-    #[cfg(feature = "parquet")]
-    pub(crate) fn add_double(&mut self, value: Option<f64>, gaps: &Spellings) {
-        match value.filter(|value| !gaps.has_number(*value)) {
-            None => self.gap(""),
-            Some(value) => {
-                let text = if self.sample.len() < SAMPLE {
-                    format!("{value}")
-                } else {
-                    String::new()
-                };
-                self.keep(&text);
-                self.number(value, 0, &text);
-            }
-        }
-    }
-
-    /// Adds a cell that is a whole number.
-    #[cfg(feature = "parquet")]
-    pub(crate) fn add_integer(&mut self, value: Option<i64>, gaps: &Spellings) {
-        match value {
-            Some(whole) if (whole as f64) as i128 != i128::from(whole) => {
-                self.keep(&whole.to_string());
-                self.integers += 1;
-                self.extend(whole as f64);
-                self.extend_whole(whole);
-            }
-            value => self.add_double(value.map(|whole| whole as f64), gaps),
-        }
-    }
-
-    /// Adds a cell that is a time, in seconds.
-    #[cfg(feature = "parquet")]
-    pub(crate) fn add_time(&mut self, seconds: Option<f64>) {
-        match seconds {
-            None => self.gap(""),
-            Some(_) => self.times += 1,
-        }
-    }
-
-    /// Adds a cell that is a boolean.
-    #[cfg(feature = "parquet")]
-    pub(crate) fn add_boolean(&mut self, value: Option<bool>) {
-        match value {
-            None => self.gap(""),
-            Some(_) => self.booleans += 1,
-        }
+        Some(class)
     }
 
     fn keep(&mut self, cell: &str) {
@@ -302,7 +295,8 @@ impl Profile {
             Kind::Time
         } else if words == 0 {
             Kind::Number
-        } else if self.texts == 0 && numbers == 0 {
+        } else if self.texts == 0 && (numbers == 0 || matches!(self.early, Early::TooMany)) {
+            // Many different numbers are no words: they are faults among booleans.
             Kind::Boolean
         } else if self.words.len() <= MAX_WORDS && self.times == 0 && !self.has_too_many {
             Kind::Words
@@ -317,8 +311,14 @@ impl Profile {
             .missing
             .keys()
             .filter(|word| !missing::is_usual(word, false) && !gaps.has_text(word));
-        let mut words: Vec<String> = self.words.keys().chain(usual).cloned().collect();
+        let early = match &self.early {
+            Early::Words(words) => Some(words.texts()),
+            Early::TooMany => None,
+        };
+        let early = early.into_iter().flatten();
+        let mut words: Vec<String> = self.words.keys().chain(usual).chain(early).cloned().collect();
         words.sort_unstable();
+        words.dedup();
         words.truncate(MAX_WORDS);
         words
     }
@@ -347,8 +347,7 @@ impl Profile {
     pub fn suspicious(&self) -> u64 {
         match self.kind() {
             Kind::Number | Kind::Integer => self.faults + self.texts + self.booleans + self.times,
-            // Too many different numbers to be words.
-            Kind::Words | Kind::Text if self.texts == 0 && self.booleans > 0 => self.numbers + self.integers,
+            Kind::Boolean => self.faults + self.numbers + self.integers + self.times,
             Kind::Time => self.faults + self.texts + self.booleans + self.numbers + self.integers,
             _ => 0,
         }

@@ -1,14 +1,12 @@
 //! Reading: rows of text become cells of columns.
 
-use crate::column::{Batch, Cells, Kind, MAX_WORDS};
+use crate::cell::{Meaning, push_cell};
+use crate::column::{Batch, Cells};
 use crate::error::{Error, Place, printable};
 use crate::guess::looks_like_time;
-use crate::missing::{self, Spellings};
 use crate::names;
 use crate::number::{self, Number};
-use crate::profile::boolean;
 use crate::table::Table;
-use crate::written::{AMBIGUOUS, Clock};
 
 /// Largest number of lines that were left out and whose faults are kept.
 const MAX_FAULTS: usize = 10;
@@ -81,7 +79,10 @@ impl Table {
             let mut is_taken = true;
             if let Some((columns, clock)) = &self.time {
                 let time = match columns.as_slice() {
-                    [column] => clock.parse(scanner.cells[*column].text(line)),
+                    [column] => match clock.quick(scanner.cells[*column].bytes(line)) {
+                        Some(time) => Ok(time),
+                        None => clock.parse(scanner.cells[*column].text(line)),
+                    },
                     several => {
                         let cells: Vec<&str> = several.iter().map(|i| scanner.cells[*i].text(line)).collect();
                         clock.of_parts(&cells)
@@ -107,7 +108,6 @@ impl Table {
                             strips: self.dialect.strip_units,
                             clock: self.clocks[*column].as_ref(),
                             kind: self.columns[*column].kind,
-                            is_fixed: self.is_fixed[*column],
                             unit: self.profiles[*column].unit.as_deref(),
                         };
                         is_taken &= push_cell(cells, cell.text(line), &meaning, &mut self.words[*column]).is_ok();
@@ -254,7 +254,6 @@ impl Table {
                     strips: self.dialect.strip_units,
                     clock: self.clocks[*column].as_ref(),
                     kind: self.columns[*column].kind,
-                    is_fixed: self.is_fixed[*column],
                     unit: self.profiles[*column].unit.as_deref(),
                 },
                 &mut self.words[*column],
@@ -295,104 +294,5 @@ impl Table {
         }
         let name = names::quoted(&printable(&self.columns[column].name));
         self.refused(column, cell, problem, mend.replace("--without", &format!("--without {name}")))
-    }
-}
-
-/// What is known of the cells of a column.
-pub(crate) struct Meaning<'a> {
-    pub(crate) syntax: number::Syntax,
-    pub(crate) gaps: &'a Spellings,
-    pub(crate) strips: bool,
-    pub(crate) clock: Option<&'a Clock>,
-    pub(crate) kind: Kind,
-    pub(crate) is_fixed: bool,
-    /// The unit behind the first number, if units are cut off.
-    pub(crate) unit: Option<&'a str>,
-}
-
-/// Adds a cell to the cells of its column.
-pub(crate) fn push_cell(
-    cells: &mut Cells,
-    text: &str,
-    meaning: &Meaning<'_>,
-    words: &mut Vec<String>,
-) -> Result<(), number::Problem> {
-    let is_numeric = matches!(meaning.kind, Kind::Number | Kind::Integer | Kind::Boolean);
-    let is_gap = missing::is_usual(text, is_numeric) || (!meaning.gaps.is_empty() && meaning.gaps.has_text(text));
-    match cells {
-        Cells::Numbers(numbers) => numbers.push(if is_gap { None } else { number(text, meaning)? }),
-        Cells::Integers(integers) => integers.push(if is_gap { None } else { integer(text, meaning.syntax)? }),
-        Cells::Booleans(booleans) => booleans.push(match (is_gap, boolean(text)) {
-            (true, _) => None,
-            (_, Some(yes)) => Some(yes),
-            _ => {
-                return Err((
-                    "is not true or false",
-                    "mend the cell, name it with --missing, or leave the column out with --without",
-                ));
-            }
-        }),
-        Cells::Times(times) => times.push(match (is_gap, meaning.clock) {
-            (true, _) => None,
-            (_, Some(clock)) => Some(clock.parse(text)?),
-            _ => return Err(AMBIGUOUS),
-        }),
-        Cells::Words(indices) => {
-            if is_gap {
-                indices.push(None);
-                return Ok(());
-            }
-            let known = words.iter().position(|word| word == text);
-            if known.is_none() && meaning.is_fixed {
-                return Err((
-                    "is none of the words of the column",
-                    "mend the cell, or leave the row out with --skip-bad",
-                ));
-            }
-            if known.is_none() && (words.len() == MAX_WORDS || meaning.kind == Kind::Text) {
-                return Err(("is text, and the column has more than 256 texts", "leave the column out with --without"));
-            }
-            indices.push(Some(known.unwrap_or_else(|| {
-                words.push(text.to_owned());
-                words.len() - 1
-            }) as u32));
-        }
-    }
-    Ok(())
-}
-
-fn number(text: &str, meaning: &Meaning<'_>) -> Result<Option<f64>, number::Problem> {
-    let parsed = number::parse(text.as_bytes(), meaning.syntax);
-    let parsed = match (&parsed, meaning.strips, number::without_unit(text)) {
-        (Err(_), true, Some((number, unit))) => match number::parse(number.as_bytes(), meaning.syntax) {
-            Ok(_) if meaning.unit.is_some_and(|known| known != unit) => Err((
-                "has another unit than rows before",
-                "write all cells in one unit, or leave such rows out with --skip-bad",
-            )),
-            found => found,
-        },
-        _ => parsed,
-    };
-    match parsed {
-        Ok(Number::Double(value, _)) => Ok(Some(value).filter(|_| !meaning.gaps.has_number(value))),
-        Ok(Number::Whole(_)) => Err((
-            "is a whole number of more than 53 bits among numbers that are read as doubles",
-            "take a file instead of a pipe if all are whole, split the column, or leave it out with --without",
-        )),
-        Err(problem) => Err(problem),
-    }
-}
-
-/// Whole doubles below this are numbers of 64 bits.
-const MOST: f64 = 9_223_372_036_854_775_808.0;
-
-fn integer(text: &str, syntax: number::Syntax) -> Result<Option<i64>, number::Problem> {
-    match number::parse(text.as_bytes(), syntax)? {
-        Number::Whole(whole) => Ok(Some(whole)),
-        Number::Double(value, _) if value.fract() == 0.0 && (-MOST..MOST).contains(&value) => Ok(Some(value as i64)),
-        Number::Double(..) => Err((
-            "is no whole number, as others of the column",
-            "mend the cell, or leave the column out with --without",
-        )),
     }
 }

@@ -57,6 +57,7 @@ impl Table {
             }
         }
         for profile in &mut survey.columns {
+            profile.settle();
             if let Some((place, _)) = &mut profile.first_text {
                 *place = self.own_place(*place);
             }
@@ -78,9 +79,17 @@ impl Table {
             let Some(length) = scanner.line(line) else {
                 break;
             };
+            // The only column of the time, if its cell is a time in a usual spelling.
+            let mut written = None;
             if let Some((columns, clock)) = &self.time {
                 let time = match columns.as_slice() {
-                    [column] => clock.parse(scanner.cells[*column].text(line)),
+                    [column] => match clock.quick(scanner.cells[*column].bytes(line)) {
+                        Some(time) => {
+                            written = Some(*column).filter(|_| clock.is_written());
+                            Ok(time)
+                        }
+                        None => clock.parse(scanner.cells[*column].text(line)),
+                    },
                     several => {
                         let cells: Vec<&str> = several.iter().map(|i| scanner.cells[*i].text(line)).collect();
                         clock.of_parts(&cells)
@@ -98,14 +107,15 @@ impl Table {
             };
             for (i, profile) in survey.columns.iter_mut().enumerate() {
                 let (cell, gaps) = (scanner.cells[i], &self.gaps[i]);
-                let text = cell.text(line);
-                let clock = self.clocks[i].as_ref();
+                let bytes = cell.bytes(line);
+                let is_time = || {
+                    let clock = self.clocks[i].as_ref().filter(|clock| clock.is_written());
+                    written == Some(i) || clock.is_some_and(|clock| clock.quick(bytes).is_some())
+                };
                 match cell.number {
-                    Some((value, decimals)) => profile.add_number(value, decimals, text, gaps),
-                    None if clock.is_some_and(|clock| clock.quick_date(text).is_some()) => {
-                        profile.add_written_time(text, gaps);
-                    }
-                    None => profile.add(text, place, self.syntax, gaps, strips),
+                    Some((value, decimals)) => profile.add_number(value, decimals, bytes, gaps),
+                    None if is_time() => profile.add_written_time(bytes, gaps),
+                    None => profile.add(cell.text(line), place, self.syntax, gaps, strips),
                 }
             }
         }

@@ -13,6 +13,7 @@ use crate::open::Rows;
 use crate::plain::Scanner;
 use crate::profile::Profile;
 use crate::survey::Survey;
+use crate::words::Words;
 use crate::written::Clock;
 
 /// A table that is read from front to end.
@@ -27,9 +28,7 @@ pub struct Table {
     /// Profiles of the columns over the first lines.
     pub(crate) profiles: Vec<Profile>,
     /// Words of each column, by their indices, and the clocks of columns of times.
-    pub(crate) words: Vec<Vec<String>>,
-    /// Whether no further words may come.
-    pub(crate) is_fixed: Vec<bool>,
+    pub(crate) words: Vec<Words>,
     /// Whether a column has cells as `<0.25`.
     pub(crate) has_limits: Vec<bool>,
     pub(crate) clocks: Vec<Option<Clock>>,
@@ -90,8 +89,7 @@ impl Table {
             arrow: None,
             dialect,
             syntax,
-            words: vec![Vec::new(); count],
-            is_fixed: vec![false; count],
+            words: vec![Words::default(); count],
             has_limits: Vec::new(),
             clocks: vec![None; count],
             selected: (first.min(count)..count).collect(),
@@ -193,21 +191,16 @@ impl Table {
     fn set_words(&mut self, profiles: &[Profile]) {
         for (i, profile) in profiles.iter().enumerate().take(self.words.len()) {
             if profile.kind() == Kind::Words {
-                self.words[i] = profile.all_words(&self.gaps[i]);
+                self.words[i] = Words::new(profile.all_words(&self.gaps[i]));
             }
         }
     }
 
     /// States the words of a column: its cells are indices into this list, and other words are refused.
     pub fn fix_words(&mut self, column: usize, words: Vec<String>) {
-        if let (Some(known), Some(is_fixed), Some(kind)) = (
-            self.words.get_mut(column),
-            self.is_fixed.get_mut(column),
-            self.columns.get_mut(column).map(|column| &mut column.kind),
-        ) {
-            *known = words;
-            *is_fixed = true;
-            *kind = Kind::Words;
+        if let (Some(known), Some(column)) = (self.words.get_mut(column), self.columns.get_mut(column)) {
+            *known = Words::fixed(words);
+            column.kind = Kind::Words;
         }
     }
 
@@ -241,7 +234,7 @@ impl Table {
 
     /// Words of a column, to which its cells refer.
     pub fn words(&self, column: usize) -> &[String] {
-        self.words.get(column).map_or(&[], Vec::as_slice)
+        self.words.get(column).map_or(&[], Words::as_slice)
     }
 
     /// Lines that were left out so far.

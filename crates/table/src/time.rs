@@ -145,9 +145,12 @@ pub(crate) fn decimals_of(mut fraction: u64) -> u8 {
 
 /// Attoseconds as seconds: whole seconds are exact.
 fn as_seconds(attoseconds: i128) -> f64 {
-    if let Ok(few) = i64::try_from(attoseconds) {
-        const UNIT: i64 = 1_000_000_000_000_000_000;
-        return few.div_euclid(UNIT) as f64 + few.rem_euclid(UNIT) as f64 / UNIT as f64;
-    }
-    attoseconds.div_euclid(SECOND) as f64 + attoseconds.rem_euclid(SECOND) as f64 / SECOND as f64
+    const UNIT: u64 = 1_000_000_000_000_000_000;
+    // By size, so that a small negative time loses no digits to a whole second below it.
+    let size = attoseconds.unsigned_abs();
+    let seconds = match u64::try_from(size) {
+        Ok(few) => (few / UNIT) as f64 + (few % UNIT) as f64 / UNIT as f64,
+        Err(_) => (size / u128::from(UNIT)) as f64 + (size % u128::from(UNIT)) as f64 / UNIT as f64,
+    };
+    if attoseconds < 0 { -seconds } else { seconds }
 }

@@ -1,7 +1,8 @@
 //! Which columns of a table give the time.
 
-use crate::clock;
+use crate::clock::{self, Refused};
 use crate::error::{Error, Place, printable};
+use crate::guess::Doubt;
 use crate::interval;
 use crate::table::Table;
 use crate::time::Scale;
@@ -102,36 +103,50 @@ impl Table {
             crate::parts::joined(&cells)
         };
         let sample: Vec<String> = (0..length).map(joined).collect();
-        let found = clock::clock(&own, &sample, &mut self.dialect).map_err(|refused| match refused {
-            Ok(error) => error,
-            Err((row, (problem, mend))) => Error::Cell {
-                place: self.profiles[columns[0]].first_text.as_ref().map_or(
-                    Place {
-                        line: self.rows.line() + 1,
-                        row: 1,
-                    },
-                    |(place, _)| *place,
-                ),
-                column: columns
-                    .iter()
-                    .map(|i| printable(&self.columns[*i].name))
-                    .collect::<Vec<_>>()
-                    .join(", "),
-                cell: printable(&sample[row]),
-                problem,
-                mend: if self.columns.len() == 1
-                    && sample[row].contains(|c: char| !c.is_alphanumeric() && !".-+/".contains(c))
-                {
-                    format!("name what separates cells with --delimiter; or {mend}")
-                } else {
-                    mend.to_owned()
-                },
-            },
-        })?;
+        let found = clock::clock(&own, &sample, &mut self.dialect);
+        let found = found.map_err(|refused| self.time_refused(&columns, &sample, refused))?;
         self.dialect.time_column = columns.iter().map(|i| self.columns[*i].name.clone()).collect();
         self.selected.retain(|column| !columns.contains(column));
         self.time = Some((columns, found));
         Ok(())
+    }
+
+    /// Why these columns are no time: their cells, joined, are the sample.
+    fn time_refused(&self, columns: &[usize], sample: &[String], refused: Refused) -> Error {
+        let (row, (problem, mend), is_order) = match refused {
+            Refused::Option(error) => return error,
+            Refused::Cell(row, problem) => (row, problem, false),
+            Refused::Doubt(doubt) => (0, doubt.problem(), doubt == Doubt::DayOrMonth),
+        };
+        let first_text = columns.first().and_then(|i| self.profiles[*i].first_text.as_ref());
+        let first_row = Place {
+            line: self.rows.line() + 1,
+            row: 1,
+        };
+        let place = first_text.map_or(first_row, |(place, _)| *place);
+        let names: Vec<String> = columns.iter().map(|i| printable(&self.columns[*i].name)).collect();
+        let (column, text) = (names.join(", "), sample.get(row).map_or("", String::as_str));
+        let is_split = self.columns.len() > 1 || !text.contains(|c: char| !c.is_alphanumeric() && !".-+/".contains(c));
+        let mend = match is_split {
+            true => mend.to_owned(),
+            false => format!("name what separates cells with --delimiter; or {mend}"),
+        };
+        let cell = printable(text);
+        if is_order {
+            return Error::DayOrMonth {
+                place,
+                column,
+                cell,
+                mend,
+            };
+        }
+        Error::Cell {
+            place,
+            column,
+            cell,
+            problem,
+            mend,
+        }
     }
 
     /// Indices of the columns of the time, and what it is measured from.

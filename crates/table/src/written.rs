@@ -21,6 +21,8 @@ pub(crate) enum Syntax {
     Parts(Vec<Part>, bool),
     /// A date, and hour, minute and second in columns of their own.
     DateAnd(Order, Vec<Part>),
+    /// Numbers with a unit behind each, as `1.5 sec`.
+    Spelled,
     /// Units of so many seconds since a zero, in seconds since 1970.
     Since(i64, i64),
     Format(String),
@@ -136,35 +138,38 @@ impl Clock {
 
     /// The time of a cell.
     pub(crate) fn parse(&self, text: &str) -> Result<Time, Problem> {
-        self.quick(text).map_or_else(|| self.slowly(text), Ok)
+        self.quick(text.as_bytes()).map_or_else(|| self.slowly(text), Ok)
     }
 
     /// The time of a cell in one of the usual spellings; `None` if it may be anything.
-    fn quick(&self, text: &str) -> Option<Time> {
+    #[inline]
+    pub(crate) fn quick(&self, text: &[u8]) -> Option<Time> {
         match self.syntax {
-            Syntax::Number(unit) => quick::ticks(text.as_bytes(), unit.decimals()),
-            Syntax::Date(_) => self.quick_date(text),
+            Syntax::Number(unit) => quick::ticks(text, unit.decimals()),
+            Syntax::OfDay => quick::of_day(text),
+            Syntax::Date(order) if self.zone.is_none() || self.scale == Scale::Utc => {
+                quick::date(text, order, self.scale)
+            }
             _ => None,
         }
     }
 
-    /// The time of a cell with a date in one of the usual spellings; `None` if it may be anything.
-    pub(crate) fn quick_date(&self, text: &str) -> Option<Time> {
-        let is_placed = matches!(self.syntax, Syntax::Date(_)) && (self.zone.is_none() || self.scale == Scale::Utc);
-        is_placed.then(|| quick::date(text.as_bytes(), self.scale))?
+    /// Whether times are written with marks, so that none is a number.
+    pub(crate) fn is_written(&self) -> bool {
+        matches!(self.syntax, Syntax::OfDay | Syntax::Date(_))
     }
 
     fn slowly(&self, text: &str) -> Result<Time, Problem> {
         let text = text.trim();
         match &self.syntax {
             Syntax::Number(unit) => self.number(text, *unit),
-            Syntax::Since(unit, zero) => {
-                let count = self.number(text, Unit::Seconds)?;
-                let size = count.0.checked_mul(i128::from(*unit)).ok_or(NO_TIME)?;
-                Ok(Time(size.checked_add(i128::from(*zero) * SECOND).ok_or(NO_TIME)?))
-            }
+            Syntax::Since(unit, zero) => self.since(text, *unit, *zero),
+            Syntax::Spelled => self.spelled(text),
             Syntax::OfDay => {
-                if let Some((second, fraction)) = civil::of_hour(text).or_else(|| civil::of_days(text)) {
+                let found = civil::of_hour(text)
+                    .or_else(|| civil::of_days(text))
+                    .or_else(|| civil::of_digits(text));
+                if let Some((second, fraction)) = found {
                     return Ok(Time::checked(second, fraction));
                 }
                 let (second, fraction, leap, rest) = civil::of_day(text).ok_or(NO_TIME)?;
@@ -191,7 +196,7 @@ impl Clock {
         }
     }
 
-    fn number(&self, text: &str, unit: Unit) -> Result<Time, Problem> {
+    pub(crate) fn number(&self, text: &str, unit: Unit) -> Result<Time, Problem> {
         match number(text, unit) {
             Err(problem) if problem == TOO_FINE && self.cuts => {
                 // What is cut is less than a nanosecond.

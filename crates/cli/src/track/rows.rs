@@ -94,8 +94,7 @@ impl Instants {
             time: options.time.clone().or(Some("±2ns".to_owned())),
             ..chosen.clone()
         };
-        let mut table = Table::open(&chosen)?;
-        table.find_time(2)?;
+        let mut table = Table::open_with_time(&chosen, 2)?;
         let roles = Roles::find(&table, kind, chosen.columns.is_empty());
         if let Some(name) = &roles.by {
             table = table.with_labels(name)?;

@@ -4,6 +4,7 @@
 
 #[cfg(feature = "mqtt")]
 mod brokers;
+mod decided;
 mod design;
 mod doors;
 mod fit;

@@ -303,3 +303,26 @@ fn relative_bounds_are_packed_shown_and_verified() {
         refused(&folder, &["pack", "r.csv", "--bound", bound, "-o", "s.fewb"], b"");
     }
 }
+
+#[test]
+fn stretches_of_whole_numbers_are_exact() {
+    let (_kept, folder) = folder();
+    let table = |from: i64| (0..60).fold("time,id\n".to_owned(), |all, i| format!("{all}{i},{}\n", from + 3 * i));
+    for (name, from) in [("a", 9_007_199_254_740_993), ("b", 9_007_199_254_742_001), ("c", 5)] {
+        std::fs::write(folder.join(format!("{name}.csv")), table(from)).unwrap();
+        let words = ["pack", &format!("{name}.csv"), "--time", "exact", "-o", name];
+        good(&folder, &words, b"");
+    }
+    let words = ["cat", "a", "--every", "30s", "--min", "--max", "--count"];
+    assert_eq!(
+        text(&good(&folder, &words, b"")),
+        "time,id min,id max,id count\n0,9007199254740993,9007199254741080,30\n30,9007199254741083,9007199254741170,30\n"
+    );
+    let words = ["cat", "a", "b", "--every", "1m", "--min", "--max", "--count"];
+    assert_eq!(
+        text(&good(&folder, &words, b"")),
+        "time,id min,id max,id count\n0,9007199254740993,9007199254742178,120\n"
+    );
+    let said = refused(&folder, &["cat", "a", "c", "--every", "1m"], b"");
+    assert!(said.contains("whole numbers of 64 bits"), "{said}");
+}

@@ -139,3 +139,49 @@ fn no_bound_and_no_earlier_bound_applies() {
     assert_eq!(restored(&playback.repack(wider, Vec::new(), Effort::Thorough).unwrap()), [Some(1 << 60), Some(3)]);
     assert!(Column::of_integers("id", 0).unwrap().with_earlier_bound(1.0).is_err());
 }
+
+#[test]
+fn stretches_of_whole_numbers_are_those_of_the_numbers() {
+    let mut random = Numbers(53);
+    let numbers = numbers(&mut random);
+    let columns = vec![
+        Column::of_integers("id", 1 << 60).unwrap(),
+        Column::new("x", Bound::Lossless).unwrap(),
+    ];
+    let schema = Schema::new(columns, TimeBase::Numbered).unwrap();
+    let schema = schema.with_rows_per_block(256).unwrap();
+    let integers = schema.columns()[0].integers().unwrap();
+    let mut recorder = Recorder::new(Vec::new(), schema);
+    for (row, number) in numbers.iter().enumerate() {
+        let code = (row % 5 != 0).then(|| integers.code(*number));
+        recorder.push_next(&[code, Some(row as f64)]).unwrap();
+    }
+    let bytes = recorder.finish().unwrap();
+    let mut playback = Playback::new(Cursor::new(&bytes)).unwrap();
+    for every in [1_u64, 7, 300, 1 << 40] {
+        let found = playback
+            .aggregates(every, (i64::MIN, i64::MAX), |error| panic!("{error}"))
+            .unwrap();
+        for stretch in &found {
+            let rows = stretch.tick as usize..numbers.len().min(stretch.tick as usize + every as usize);
+            let inside: Vec<i64> = rows
+                .clone()
+                .filter(|row| row % 5 != 0)
+                .map(|row| numbers[row])
+                .collect();
+            let whole = stretch.wholes[0].unwrap();
+            assert_eq!((whole.count(), stretch.rows), (inside.len() as u64, rows.len() as u64));
+            let ends = inside.iter().min().copied().zip(inside.iter().max().copied());
+            assert_eq!(whole.ends(), ends);
+            let sum: i128 = inside.iter().map(|number| i128::from(*number)).sum();
+            if let Some(mean) = whole.mean() {
+                let off = mean - sum as f64 / inside.len() as f64;
+                assert!(off.abs() <= 4.0 * f64::EPSILON * mean.abs().max(1.0), "{mean} {sum}");
+            }
+            // The other column is as before.
+            assert_eq!(stretch.wholes[1], None);
+            assert_eq!(stretch.columns[1].ends(), Some((rows.start as f64, rows.end as f64 - 1.0)));
+        }
+        assert_eq!(found.iter().map(|stretch| stretch.rows).sum::<u64>(), numbers.len() as u64);
+    }
+}

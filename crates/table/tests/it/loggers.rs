@@ -93,7 +93,7 @@ fn oscilloscopes_and_laboratories() {
     check(
         "x-axis,1,2\nsecond,Volt,Volt\n-2.0E-06,+1.5E+00,+2.5E+00\n+0.0E+00,+1.6E+00,+2.6E+00\n",
         &["x-axis [second]", "1 [Volt]", "2 [Volt]"],
-        &[],
+        &[-2e-6, 0.0],
         1,
         &[1.5, 1.6],
     );
@@ -103,7 +103,7 @@ fn oscilloscopes_and_laboratories() {
             "Record Length,Analog:2\nVertical Units,Volt\nHorizontal Scale,1e-06\nSource,CH1\nSecond,Volt\n{rows}"
         ),
         &["Source [Second]", "CH1 [Volt]"],
-        &[],
+        &(0..20).map(f64::from).collect::<Vec<_>>(),
         1,
         &(0..20).map(|i| f64::from(i) + 0.5).collect::<Vec<_>>(),
     );

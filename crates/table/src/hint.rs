@@ -1,0 +1,90 @@
+//! Texts that are no numbers as they stand: whether they are likely numbers of another spelling, and the option that would read them.
+
+use crate::number::{BLANKS, SPACES, without_unit};
+
+/// The option that the look of a cell suggests.
+pub(crate) fn hint(text: &str) -> &'static str {
+    let digits = text.bytes().filter(u8::is_ascii_digit).count();
+    let commas = text.bytes().filter(|c| *c == b',').count();
+    let points = text.bytes().filter(|c| *c == b'.').count();
+    let plain = text
+        .chars()
+        .all(|c| c.is_ascii_digit() || "+-.,'\u{2019}\u{2212} eE".contains(c));
+    let is_spaced = text.contains(SPACES) || text.split(' ').skip(1).any(|group| group.len() >= 3);
+    let is_grouped = is_spaced
+        && text
+            .chars()
+            .all(|c| c.is_ascii_digit() || SPACES.contains(&c) || "+-., ".contains(c));
+    if text.contains('\0') {
+        "the cell has NUL bytes, as after a loss of power: leave such lines out with --skip-bad 1 or more"
+    } else if digits == 0 {
+        "make it a gap with --missing, leave such lines out with --skip-bad, or the column with --without"
+    } else if is_grouped {
+        if commas == 1 && points == 0 {
+            "say --thousands ' ' --decimal ,"
+        } else {
+            "say --thousands ' '"
+        }
+    } else if text.contains(CURRENCIES) && !text.ends_with(CURRENCIES) {
+        "a sign in front of the number is not read: take it away, or leave the column out with --without"
+    } else if text.starts_with('(') && text.ends_with(')') {
+        "if brackets mean a negative number, write a minus; or leave the column out with --without"
+    } else if plain && digits > 1 && text.ends_with('-') {
+        "if a minus behind the number makes it negative, write it in front; or leave the column out with --without"
+    } else if plain && commas == 1 && points == 0 && text.len() - text.find(',').unwrap_or(0) == 4 {
+        "say --thousands , if these are groups of digits, or --decimal , (with --delimiter ';' or tab) if they are decimals"
+    } else if plain && commas == 1 && points == 0 {
+        "if it has a decimal comma, say --decimal , (and --delimiter ';' or tab)"
+    } else if plain && (commas > 1 || (commas == 1 && points == 1)) {
+        if text.rfind(',') > text.rfind('.') {
+            "say --decimal , --thousands ."
+        } else {
+            "say --thousands ,"
+        }
+    } else if plain && text.contains(['\'', '\u{2019}']) && !text.starts_with('\'') {
+        "say --thousands \"'\""
+    } else if text.bytes().all(|c| c.is_ascii_digit() || b"+-.,_".contains(&c)) && text.contains('_') {
+        "say --thousands _"
+    } else if plain && points > 2 {
+        "say --thousands and the mark between groups"
+    } else if text.ends_with('%') || text.ends_with(|c: char| c.is_alphabetic()) && !text.contains('x') {
+        "if a unit stands behind the number, say --strip-units"
+    } else if text.starts_with("0x") || text.starts_with("0X") {
+        "hexadecimal numbers are not read: convert the column, or leave it out with --without"
+    } else {
+        "mend the cell, name it with --missing, leave such lines out with --skip-bad, or the column with --without"
+    }
+}
+
+/// Signs that may stand before a number.
+const CURRENCIES: [char; 4] = ['$', '€', '£', '¥'];
+
+/// Whether a text is likely a number of another spelling, with groups, a decimal comma or a unit.
+pub(crate) fn looks_like_number(text: &str) -> bool {
+    let text = text
+        .strip_prefix('(')
+        .and_then(|text| text.strip_suffix(')'))
+        .unwrap_or(text);
+    let size = text
+        .trim_matches(BLANKS)
+        .trim_start_matches(['-', '+', '\'', '\u{2212}'])
+        .trim_start_matches(CURRENCIES)
+        .trim_start_matches(['-', ' ']);
+    if !size.starts_with(char::is_numeric) {
+        return false;
+    }
+    // A minus behind the number, fractions and digits of other scripts too.
+    let hexadecimal = size.strip_prefix("0x").or(size.strip_prefix("0X"));
+    let is_plain = size
+        .strip_suffix('-')
+        .unwrap_or(size)
+        .chars()
+        .all(|c| c.is_numeric() || ".,'_\u{2019} ".contains(c) || SPACES.contains(&c))
+        || hexadecimal.is_some_and(|digits| digits.bytes().all(|c| c.is_ascii_hexdigit()));
+    let has_unit = without_unit(size).is_some_and(|(number, unit)| {
+        let is_spaced = size.as_bytes().get(number.len()) == Some(&b' ');
+        number.parse::<f64>().is_ok()
+            && (unit.starts_with(['%', '°', 'µ']) || (is_spaced && unit.len() <= 6 && !unit.contains(' ')))
+    });
+    is_plain || has_unit
+}
