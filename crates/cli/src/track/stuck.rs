@@ -58,8 +58,8 @@ impl Stuck {
         let of = |(repeats, name): (&Repeats, &String)| {
             let (value, run) = repeats.stuck?;
             Some(format!(
-                "{name} is {value} in {run} values in a row, which its values hardly ever repeat otherwise: it may be stuck, and then others \
-                 are excluded in its place; --without {name} leaves it out"
+                "{name} is {value} in {run} values in a row, which its values hardly ever repeat otherwise: it may be stuck; --without {name} \
+                 leaves it out"
             ))
         };
         self.0.iter().zip(names).filter_map(of).collect()

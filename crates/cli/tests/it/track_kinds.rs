@@ -2,7 +2,7 @@
 
 use crate::numbers::Numbers;
 use crate::track_found::{has_hint, held, of, tracked};
-use crate::{good, refused, text};
+use crate::{fewbits, good, refused, text};
 use serde_json::Value;
 
 /// Number of rows whose band holds the level.
@@ -210,7 +210,6 @@ fn stuck_sensors_signal_strengths_and_reports_on_change_are_told() {
     std::fs::write(folder.path().join("anchors.csv"), "name,x,y\np,0,0\nq,9,0\nr,9,6\ns,0,6\n").unwrap();
     let strengths = "time,p,q,r,s\n0,-45,-56,-61,-50\n1,-46,-55,-60,-51\n";
     let words = ["ranges", "-", "--anchors", "anchors.csv"];
-    let run = good(folder.path(), &words, strengths.as_bytes());
-    let said = String::from_utf8_lossy(&run.stderr).into_owned();
+    let said = text(&fewbits(folder.path(), &words, strengths.as_bytes()).stderr);
     assert!(said.contains("Signal strengths in dBm"), "{said}");
 }
