@@ -8,7 +8,6 @@ use crate::arguments::Model;
 use crate::error::Failure;
 use crate::report::Report;
 use fewbits_core::{BitString, Gaussian, Link, Message, NumberFormat, Observation, OnAxes, SensorNode};
-use fewbits_filters::calibration;
 use fewbits_filters::centre::{
     Failures, FalseAlarms, FusionCentre, NoiseLearning, ReportTest, Reporting, SensorState, Slot,
 };
@@ -154,7 +153,8 @@ fn moments<const D: usize>(belief: &Gaussian<D>, zero: f64) -> Vec<(f64, f64)> {
 fn nearest(cell: f64, expected: f64, period: Option<f64>) -> f64 {
     match period {
         None => cell,
-        Some(_) => expected + calibration::wrapped(cell - expected, period),
+        // An equal cell stays an equal value.
+        Some(period) => cell + period * ((expected - cell) / period).round(),
     }
 }
 

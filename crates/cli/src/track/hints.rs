@@ -59,11 +59,13 @@ pub(super) fn hints(
             ));
         }
         let silent = (cells.len() - values.len()) as f64;
+        // Rows without an empty cell show silence by their times only.
+        let is_dense = is_long || silent == 0.0;
         let least = steps.iter().fold(f64::INFINITY, |least, step| least.min(*step));
         let typical = median(steps.clone());
         if options.silent_within.is_none()
-            && values.len() >= if is_long { FEWEST_ROWS } else { FEWEST }
-            && if is_long {
+            && values.len() >= if is_dense { FEWEST_ROWS } else { FEWEST }
+            && if is_dense {
                 is_irregular(&timed)
             } else {
                 silent > EMPTY * cells.len() as f64
@@ -79,6 +81,7 @@ pub(super) fn hints(
             ));
         }
     }
+    lines.extend(unheard(options, first));
     if options.align.is_none() && options.period.is_none() {
         lines.extend(apart(first, names));
     }
@@ -99,6 +102,20 @@ pub(super) fn hints(
         lines.push(format!("the first rows have a slope: {what}"));
     }
     lines
+}
+
+/// Silence that is said to mean something, in a table that has none.
+fn unheard(options: &TrackOptions, first: &[Instant]) -> Option<String> {
+    let said = options.silent_within.as_deref().filter(|said| !said.contains('/'))?;
+    let is_empty = first
+        .iter()
+        .any(|instant| instant.reports.iter().any(|(_, cell)| cell.is_none()));
+    (!is_empty && first.len() >= FEWEST_ROWS).then(|| {
+        format!(
+            "--silent-within {said} says nothing here, since the first rows have no silence: if rows are reports only, say how often the sensor \
+             measures, as --silent-within {said}/60s"
+        )
+    })
 }
 
 /// Sensors of constant offset from the others.

@@ -6,6 +6,7 @@ use super::report::{BAND, cells, first_cell, first_name, summarise};
 use super::rhythm::Rhythm;
 use super::rows::{Instant, Instants};
 use super::settings::Settings;
+use super::stuck::Stuck;
 use super::summary::{EventSummary, SensorSummary, Summary, lines};
 use crate::Ending;
 use crate::arguments::{Model, TrackOptions};
@@ -241,6 +242,7 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
         .chain(last);
     let shown = (settings.circle, parts.len());
     let mut turning = Turning::new(settings.world.period.is_none() && options.period.is_none() && !options.reports);
+    let mut stuck = (!options.reports && options.silent_within.is_none()).then(Stuck::default);
     let mut run = Run::new(options, settings, &instants)?;
     let mut sheet = Sheet::new(options.output.as_deref(), Shape::of(options.json), names.collect())?;
     let lag = options.smooth.as_deref().map(lag).transpose()?;
@@ -262,6 +264,9 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
         }
         let step = run.step(&instant, &instants.names, std::mem::take(&mut between))?;
         turning.add(&instant);
+        if let Some(stuck) = &mut stuck {
+            stuck.add(&instant);
+        }
         if !options.reports {
             let values = instant
                 .reports
@@ -294,6 +299,8 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
     sheet.finish()?;
     run.summary.copies = instants.copies;
     run.summary.hints.extend(turning.hints(&instants.names));
+    let lines_of = |stuck: &Stuck| stuck.hints(&instants.names);
+    run.summary.hints.extend(stuck.iter().flat_map(lines_of));
     let (summary, picture) = run.finish(options)?;
     if let Some(path) = &options.plot {
         picture.save(path)?;

@@ -10,6 +10,7 @@
 //! | `first` | values of the first rows |
 //! | `found` | what is found from the first rows |
 //! | `hints` | what the first rows suggest that no option says |
+//! | `stuck` | sensors that repeat one value |
 //! | `limits` | detection limits |
 //! | `late` | rows that come late |
 //! | `rhythm` | silence in a table of single reports |
@@ -43,6 +44,7 @@ mod rows;
 mod samples;
 mod sensors;
 mod settings;
+mod stuck;
 mod summary;
 mod world;
 

@@ -294,7 +294,12 @@ fn lines(summary: &Summary, tracker: &RangeTracker, silence: f64) -> Vec<String>
             summary.ambiguous
         ));
     }
-    if summary.negative > 0 {
+    if summary.negative > 0 && summary.ranges == 0 {
+        lines.push(format!(
+            "all {} values are negative: they are no distances. Signal strengths in dBm must be made distances first; differences of ranges need --unknown-clock",
+            summary.negative
+        ));
+    } else if summary.negative > 0 {
         lines.push(format!(
             "{} negative ranges were left out: they are no distances; differences of ranges need --unknown-clock",
             summary.negative

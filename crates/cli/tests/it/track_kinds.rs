@@ -2,7 +2,7 @@
 
 use crate::numbers::Numbers;
 use crate::track_found::{has_hint, held, of, tracked};
-use crate::{good, refused, text};
+use crate::{fewbits, good, refused, text};
 use serde_json::Value;
 
 /// Number of rows whose band holds the level.
@@ -180,4 +180,36 @@ fn anchors_by_number_are_found_and_bits_are_told() {
     assert_eq!(found, stated);
     let (_, summary) = tracked(&bits, &[]);
     assert!(has_hint(&summary, "--reports --send bit"), "{summary}");
+}
+
+/// Defect: of two sensors of which one was stuck the other was excluded, signal strengths were asked for `--unknown-clock`, and reports on
+/// change without an empty cell were not recognised, nor a `--silent-within` that had no effect on them.
+#[test]
+fn stuck_sensors_signal_strengths_and_reports_on_change_are_told() {
+    let mut numbers = Numbers(619);
+    let (mut level, mut last, mut pair, mut changes) = (0.0, f64::NAN, "time,a,b\n".to_owned(), "time,c\n".to_owned());
+    let mut kept = f64::NAN;
+    for row in 0..400 {
+        level += 0.05 * numbers.normal();
+        let (a, b) = (level + 0.1 * numbers.normal(), level + 0.1 * numbers.normal());
+        kept = if row < 200 { b } else { kept };
+        pair += &format!("{row},{a},{kept}\n");
+        let value = 4.0 * (0.03 * f64::from(row)).sin() + 0.02 * numbers.normal();
+        if !((value - last).abs() < 0.5) {
+            last = value;
+            changes += &format!("{},{value}\n", 60 * row);
+        }
+    }
+    let (_, summary) = tracked(&pair, &[]);
+    assert!(has_hint(&summary, "--without b") && !has_hint(&summary, "--without a"), "{summary}");
+    let (_, summary) = tracked(&changes, &[]);
+    assert!(has_hint(&summary, "sends on change"), "{summary}");
+    let (_, summary) = tracked(&changes, &["--silent-within", "0.5"]);
+    assert!(has_hint(&summary, "--silent-within 0.5/60s"), "{summary}");
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("anchors.csv"), "name,x,y\np,0,0\nq,9,0\nr,9,6\ns,0,6\n").unwrap();
+    let strengths = "time,p,q,r,s\n0,-45,-56,-61,-50\n1,-46,-55,-60,-51\n";
+    let words = ["ranges", "-", "--anchors", "anchors.csv"];
+    let said = text(&fewbits(folder.path(), &words, strengths.as_bytes()).stderr);
+    assert!(said.contains("Signal strengths in dBm"), "{said}");
 }

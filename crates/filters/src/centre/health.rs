@@ -229,6 +229,8 @@ pub(super) struct Limits {
     pub centre: SumLimits,
     /// Probability below which a report is rejected.
     pub gate: f64,
+    /// Rate at which a sensor is excluded by a false alarm.
+    pub rate: f64,
 }
 
 impl Limits {
@@ -238,6 +240,7 @@ impl Limits {
             // Residuals have no part in it.
             centre: SumLimits::new(rates.centre / SEQUENCES as f64),
             gate: rates.gate(),
+            rate: rates.sensor,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::gate::Fate;
 use super::health::{self, Alarm, CLIP, Health, Residual, SEQUENCES};
+use super::repeats::Repeated;
 use super::{Event, FusionCentre};
 use crate::Error;
 use crate::contract::StateFilter;
@@ -29,6 +30,8 @@ pub(super) struct Watched {
     pub fate: Fate,
     /// The residual of a report given the prediction and all other reports that are used.
     pub apart: Option<Residual>,
+    /// The value that it is, and the variance of its noise.
+    pub value: Option<(f64, f64)>,
     pub shown: Shown,
 }
 
@@ -47,11 +50,12 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         let mut events = Vec::new();
         let mut pooled = [(0.0, 0_u32); SEQUENCES];
         let (mut products, mut together, mut is_any_used, mut is_any_rejected) = (0.0, 0.0, false, false);
-        let mut alarmed = Vec::new();
+        let (mut alarmed, mut repeating) = (Vec::new(), Vec::new());
         for Watched {
             seat,
             fate,
             apart,
+            value,
             shown,
         } in watched
         {
@@ -82,7 +86,20 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 state.astray = 0;
                 is_any_used = true;
             }
-            if self.health == Health::Off || (apart.is_none() && *fate != Fate::Rejected) {
+            if self.health == Health::Off {
+                continue;
+            }
+            if let Some((value, variance)) = value {
+                match state.repeats.add(*value, *variance, self.limits.rate) {
+                    Repeated::Suspect if !state.repeats.is_stuck => repeating.push(*seat),
+                    Repeated::MovesAgain if !state.excluded => {
+                        state.forget_tests();
+                        events.push(Event::Readmitted(number));
+                    }
+                    _ => {}
+                }
+            }
+            if apart.is_none() && *fate != Fate::Rejected {
                 continue;
             }
             let product = |last: &mut Option<f64>, residual: f64| {
@@ -104,7 +121,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             // A report that is too unlikely beside another begins a dispute of both at once.
             let is_contested = matches!(fate, Fate::Contested(_));
             let is_unlikely = is_contested && apart.is_some_and(|one| one.tail < self.limits.gate);
-            state.quiet = if is_alarm || is_unlikely {
+            state.quiet = if is_alarm || is_unlikely || state.repeats.is_stuck {
                 0
             } else {
                 state.quiet.saturating_add(1)
@@ -143,7 +160,10 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             (false, true) => self.astray = self.astray.saturating_add(1),
             (false, false) => {}
         }
-        // 2. Exclusion: at most half of the sensors.
+        // 2. Exclusion: of those that are stuck while another moves, and of at most half of the sensors for what they say.
+        for seat in repeating {
+            self.hold(seat, &mut events);
+        }
         for seat in alarmed {
             self.exclude(seat, &mut events);
         }
@@ -176,18 +196,48 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         Ok(events)
     }
 
+    /// Decides about a sensor that repeats one value: it is stuck if another still moves.
+    fn hold(&mut self, seat: usize, events: &mut Vec<Event>) {
+        let is_moving = |(other, member): &(usize, &super::Member<D>)| {
+            *other != seat && !member.state.presence.named_dead && member.state.repeats.run == 0
+        };
+        let moving = self.members.iter().enumerate().filter(is_moving);
+        let moving: Vec<(usize, bool)> = moving.map(|(other, member)| (other, member.state.excluded)).collect();
+        if moving.is_empty() {
+            return;
+        }
+        events.push(Event::Excluded(self.members[seat].number));
+        self.members[seat].state.repeats.is_stuck = true;
+        if self.health != Health::Exclude {
+            return;
+        }
+        // The others were judged against it. If none of them is in use, they were excluded for what this one said.
+        if moving.iter().all(|(_, is_excluded)| *is_excluded) {
+            for (other, _) in moving {
+                self.members[other].state.excluded = false;
+                events.push(Event::Readmitted(self.members[other].number));
+            }
+        }
+        self.members.iter_mut().for_each(|member| {
+            let astray = member.state.astray;
+            member.state.forget_tests();
+            member.state.astray = astray;
+        });
+        self.monitor = health::Monitor::default();
+    }
+
     /// Decides about a sensor whose test raised an alarm. It is excluded if it alone is suspect, or by far the most. If another is about as
     /// suspect, both are in dispute: their reports contradict each other, and nothing says which is wrong.
     fn exclude(&mut self, seat: usize, events: &mut Vec<Event>) {
         let own = self.members[seat].state;
-        let excluded = self.members.iter().filter(|member| member.state.excluded).count();
-        if own.excluded || self.health == Health::Off {
+        let excluded = self.members.iter().filter(|member| member.state.is_out()).count();
+        if own.is_out() || self.health == Health::Off {
             return;
         }
         let suspicion = |state: &super::state::MemberState| state.monitor.contradiction(&self.limits.sensor);
         let others = || {
             let all = self.members.iter().enumerate();
-            all.filter(|(other, member)| *other != seat && !member.state.excluded && !member.state.presence.named_dead)
+            all.filter(|(other, member)| *other != seat && !member.state.is_out() && !member.state.presence.named_dead)
         };
         let is_alone = others().all(|(_, member)| suspicion(&member.state) < SUSPECT);
         let deepest = others()

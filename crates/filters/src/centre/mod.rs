@@ -36,6 +36,7 @@ mod presence;
 mod reading;
 mod receive;
 mod remote;
+mod repeats;
 mod slot;
 mod state;
 mod together;
@@ -285,7 +286,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         Ok(SensorState {
             working: state.presence.working,
             declared_dead: state.presence.named_dead,
-            excluded: state.excluded,
+            excluded: state.excluded || (state.repeats.is_stuck && self.health == Health::Exclude),
             disputed: state.disputed,
             rejected: state.rejected,
             copies: state.copies,

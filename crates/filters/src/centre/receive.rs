@@ -97,6 +97,9 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 seat: reading.seat,
                 fate: verdict.fate,
                 apart: verdict.tested.residual,
+                value: (reading.content == Content::Report && self.health != Health::Off)
+                    .then(|| self.members[reading.seat].sensor.value(reading.slot))
+                    .flatten(),
                 shown,
             })
             .collect();

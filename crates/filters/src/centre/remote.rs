@@ -54,6 +54,12 @@ pub trait RemoteSensor<const D: usize>: Send + Sync {
         self.value_variance(predicted).map(ReportTest::Value)
     }
 
+    /// The value that the report in a slot is, and the variance of its noise. `None` for words, vectors, cells, and values that come only on
+    /// change. A centre needs it to find sensors that are stuck at a value.
+    fn value(&self, _slot: &Slot) -> Option<(f64, f64)> {
+        None
+    }
+
     /// Probability that a report that was sent arrives.
     fn arrival(&self) -> f64;
 
@@ -247,6 +253,17 @@ where
             }
             Some(cell) => cell,
         })
+    }
+
+    fn value(&self, slot: &Slot) -> Option<(f64, f64)> {
+        let own = self.tests.and_then(|tests| slot.observation.received().and_then(tests));
+        if !self.sends_values || M != 1 || matches!(own, Some(ReportTest::Cell(_))) {
+            return None;
+        }
+        match self.observed(slot, 1.0).ok()?.factor.as_scalar()? {
+            Scalar::Value(value) => Some((value.value()[0], value.noise_covariance()[0])),
+            Scalar::Levels(_) => None,
+        }
     }
 
     fn arrival(&self) -> f64 {

@@ -2,6 +2,7 @@
 
 use super::health::Monitor;
 use super::presence::{Outage, Presence};
+use super::repeats::Repeats;
 use super::{FusionCentre, Slot};
 use crate::Error;
 use crate::contract::StateFilter;
@@ -12,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The version of the stored form.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 
 /// State of one sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -38,6 +39,7 @@ pub(super) struct MemberState {
     pub astray: u32,
     /// Number of copies of reports that were dropped.
     pub copies: u64,
+    pub repeats: Repeats,
 }
 
 impl MemberState {
@@ -54,7 +56,13 @@ impl MemberState {
             rejected: 0,
             astray: 0,
             copies: 0,
+            repeats: Repeats::new(),
         }
+    }
+
+    /// Whether its reports are not used from now on: it contradicts the others, or is stuck.
+    pub(crate) fn is_out(&self) -> bool {
+        self.excluded || self.repeats.is_stuck
     }
 
     /// Forgets what was found against a prediction or a set of sensors that is no longer in use.

@@ -20,6 +20,7 @@ mod resample;
 mod sigma_points;
 mod state_noise;
 mod stored;
+mod stuck;
 mod tangent;
 mod unchanged;
 mod wild;
