@@ -195,7 +195,7 @@ fn stuck_sensors_signal_strengths_and_reports_on_change_are_told() {
         kept = if row < 200 { b } else { kept };
         pair += &format!("{row},{a},{kept}\n");
         let value = 4.0 * (0.03 * f64::from(row)).sin() + 0.02 * numbers.normal();
-        if !((value - last).abs() < 0.5) {
+        if last.is_nan() || (value - last).abs() >= 0.5 {
             last = value;
             changes += &format!("{},{value}\n", 60 * row);
         }
