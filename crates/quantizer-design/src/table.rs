@@ -131,11 +131,6 @@ impl JointTable {
             .sum()
     }
 
-    /// Values of the unknown, the columns of the table.
-    pub fn values(&self) -> &[f64] {
-        self.model().values()
-    }
-
     /// Maximum a posteriori value of the unknown, as an index into [`values`](Self::values); the first if several are equal.
     pub fn decide(&self, outcome: usize) -> usize {
         most_probable(self.model().weights(), self.likelihood(outcome))
