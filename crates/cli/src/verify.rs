@@ -4,6 +4,7 @@ use crate::arguments::{TableOptions, VerifyOptions};
 use crate::error::Error;
 use crate::input::Table;
 use crate::opening::day_order;
+use crate::pack::own_tolerance;
 use crate::rows::TableRows;
 use crate::{Ending, clock, numbers, output, recording, say};
 use fewbits_recipes::names;
