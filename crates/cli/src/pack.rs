@@ -254,8 +254,7 @@ fn continued(options: &TableOptions, schema: &Schema, file: &str) -> Result<Tabl
     })
 }
 
-/// Continues a recording. Appending is a transaction of the recorder: a table that is refused, a kill and a full disk leave the recording
-/// as it was, and of two commands that append to one recording the second is refused.
+/// Continues a recording. A table that is refused, a kill and a full disk leave it as it was, and of two commands the second is refused.
 fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, Option<Error>), Error> {
     let file = path.display().to_string();
     let schema = Playback::open(path).map_err(Error::recording(&file))?.schema().clone();

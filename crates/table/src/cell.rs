@@ -1,6 +1,7 @@
 //! Cells of text as cells of columns.
 
 use crate::column::{Cells, Kind, MAX_WORDS};
+use crate::hint::without_unit;
 use crate::missing::{self, Spellings};
 use crate::number::{self, Number};
 use crate::profile::boolean;
@@ -72,7 +73,7 @@ pub(crate) fn push_cell(
 
 fn number(text: &str, meaning: &Meaning<'_>) -> Result<Option<f64>, number::Problem> {
     let parsed = number::parse(text.as_bytes(), meaning.syntax);
-    let parsed = match (&parsed, meaning.strips, number::without_unit(text)) {
+    let parsed = match (&parsed, meaning.strips, without_unit(text)) {
         (Err(_), true, Some((number, unit))) => match number::parse(number.as_bytes(), meaning.syntax) {
             Ok(_) if meaning.unit.is_some_and(|known| known != unit) => Err((
                 "has another unit than rows before",

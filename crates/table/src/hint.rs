@@ -1,6 +1,11 @@
 //! Texts that are no numbers as they stand: whether they are likely numbers of another spelling, and the option that would read them.
 
-use crate::number::{BLANKS, SPACES, without_unit};
+/// Marks without ink at the ends of cells, as programs leave them: spaces of several kinds, and the mark of an encoding.
+pub(crate) const BLANKS: [char; 7] = [
+    '\u{a0}', '\u{202f}', '\u{2009}', '\u{200b}', '\u{feff}', '\u{b}', '\u{c}',
+];
+/// Spaces between groups of digits that are no plain ones.
+pub(crate) const SPACES: [char; 3] = ['\u{a0}', '\u{202f}', '\u{2009}'];
 
 /// The option that the look of a cell suggests.
 pub(crate) fn hint(text: &str) -> &'static str {
@@ -87,4 +92,11 @@ pub(crate) fn looks_like_number(text: &str) -> bool {
             && (unit.starts_with(['%', '°', 'µ']) || (is_spaced && unit.len() <= 6 && !unit.contains(' ')))
     });
     is_plain || has_unit
+}
+
+/// The number in front of a unit, as `19.75` of `19.75 °C`.
+pub(crate) fn without_unit(text: &str) -> Option<(&str, &str)> {
+    let end = text.rfind(|c: char| c.is_ascii_digit())? + 1;
+    let (number, unit) = text.split_at(end);
+    (!unit.is_empty()).then(|| (number.trim_end(), unit.trim()))
 }

@@ -1,6 +1,6 @@
 //! What points and commas in numbers mean, by the first rows.
 
-use crate::number::SPACES;
+use crate::hint::SPACES;
 
 /// Whether numbers have decimal commas without a doubt: a comma before other than three digits, and no decimal points.
 pub(crate) fn has_decimal_commas(rows: &[(u64, Vec<String>)]) -> bool {

@@ -1,6 +1,6 @@
 //! Numbers as loggers write them. What a double cannot hold is refused, never rounded in silence.
 
-use crate::hint::hint;
+use crate::hint::{BLANKS, SPACES, hint};
 
 /// How numbers are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -186,13 +186,6 @@ fn slowly(text: &[u8], syntax: Syntax) -> Result<Number, Fault> {
     }
 }
 
-/// Marks without ink at the ends of cells, as programs leave them: spaces of several kinds, and the mark of an encoding.
-pub(crate) const BLANKS: [char; 7] = [
-    '\u{a0}', '\u{202f}', '\u{2009}', '\u{200b}', '\u{feff}', '\u{b}', '\u{c}',
-];
-/// Spaces between groups of digits that are no plain ones.
-pub(crate) const SPACES: [char; 3] = ['\u{a0}', '\u{202f}', '\u{2009}'];
-
 /// A number with an exponent as of Fortran, `1.95D+01`, with that of others.
 fn fortran(text: &str) -> Option<String> {
     let (size, exponent) = text.split_once(['D', 'd'])?;
@@ -237,13 +230,6 @@ fn grouped(text: &str, mark: char, decimal: char) -> Option<String> {
         format!("{decimal}{rest}")
     };
     Some(format!("{sign}{}{decimal}", groups.concat()))
-}
-
-/// The number in front of a unit, as `19.75` of `19.75 °C`.
-pub(crate) fn without_unit(text: &str) -> Option<(&str, &str)> {
-    let end = text.rfind(|c: char| c.is_ascii_digit())? + 1;
-    let (number, unit) = text.split_at(end);
-    (!unit.is_empty()).then(|| (number.trim_end(), unit.trim()))
 }
 
 #[cfg(test)]

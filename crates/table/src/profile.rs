@@ -6,7 +6,7 @@ use crate::ends::{self, End, Sentinel};
 use crate::error::Place;
 use crate::extent::{Extent, FewCells};
 use crate::guess;
-use crate::hint::looks_like_number;
+use crate::hint::{looks_like_number, without_unit};
 use crate::missing::{self, Spellings};
 use crate::number::{self, Number};
 use crate::quick;
@@ -102,7 +102,7 @@ impl Profile {
         }
         self.keep(cell);
         let parsed = number::read(cell.as_bytes(), syntax);
-        let parsed = match (&parsed, number::without_unit(cell).filter(|_| strips)) {
+        let parsed = match (&parsed, without_unit(cell).filter(|_| strips)) {
             (Err(_), Some((number, unit))) => match number::read(number.as_bytes(), syntax) {
                 Ok(_) if self.unit.get_or_insert_with(|| unit.to_owned()) != unit => parsed,
                 found => found,
