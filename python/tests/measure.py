@@ -7,7 +7,7 @@ import numpy as np
 import polars as pl
 
 import fewbits as fb
-from fewbits._fewbits import _codec_seconds  # type: ignore[attr-defined]
+from fewbits._fewbits import _codec_seconds
 
 
 def best(work, repetitions=5):
