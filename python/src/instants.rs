@@ -3,14 +3,15 @@
 use crate::error::{Outcome, refused};
 use crate::seat::{Missing, Seat};
 use crate::table::{Given, Origin};
+use smallvec::SmallVec;
 
 /// All samples of one time.
 pub(crate) struct Instant {
     pub(crate) seconds: f64,
     /// The first row of the table with this time.
     pub(crate) row: usize,
-    /// Sensor and sample; `None` if a report was due and nothing arrived.
-    pub(crate) samples: Vec<(usize, Option<f64>)>,
+    /// Sensor and sample; `None` if a report was due and nothing arrived. Most instants have few: then nothing is allocated.
+    pub(crate) samples: SmallVec<[(usize, Option<f64>); 2]>,
 }
 
 /// Where a long table has names and samples.

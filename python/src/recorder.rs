@@ -184,7 +184,30 @@ pub(crate) fn tick_of(value: &Bound<'_, PyAny>, name: &'static str, time: TimeBa
         return refused(name, value, "a number of seconds");
     }
     let numpy = value.py().import("numpy")?;
-    // An aware datetime is taken to UTC first: NumPy knows no zones.
+    // An aware datetime is taken to UTC first: NumPy knows no zones. Of a text the offset is cut off.
+    let text: Option<String> = value.extract().ok();
+    let zoned = text.as_deref().and_then(offset_of);
+    if zoned.is_some() && matches!(format, TimeFormat::Local) {
+        return refused(name, value, "a time without a zone, as those of the recording");
+    }
+    let (value, shift) = match zoned {
+        Some((plain, offset)) => {
+            let datetime = value.py().import("datetime")?.getattr("datetime")?;
+            let shift = datetime
+                .call_method1("fromisoformat", (format!("2000-01-01T00:00:00{offset}"),))
+                .and_then(|any| {
+                    any.call_method0("utcoffset")?
+                        .call_method0("total_seconds")?
+                        .extract::<f64>()
+                });
+            let Ok(shift) = shift else {
+                return refused(name, value, "a time with an offset as `+01:00`");
+            };
+            (plain.into_pyobject(value.py()).map_err(PyErr::from)?.into_any(), (shift * 1e9).round() as i64)
+        }
+        None => (value.clone(), 0),
+    };
+    let value = &value;
     let given = match value.getattr("tzinfo") {
         Ok(zone) if !zone.is_none() && matches!(format, TimeFormat::Local) => {
             return refused(name, value, "a time without a zone, as those of the recording");
@@ -202,13 +225,22 @@ pub(crate) fn tick_of(value: &Bound<'_, PyAny>, name: &'static str, time: TimeBa
     let Ok(nanoseconds) = stamp.and_then(|stamp| stamp.call_method1("astype", ("int64",))?.extract::<i64>()) else {
         return refused(name, value, "seconds since 1970, or a time that numpy.datetime64 takes");
     };
-    if nanoseconds == i64::MIN {
+    let shifted = Some(nanoseconds).filter(|stamp| *stamp != i64::MIN);
+    let Some(nanoseconds) = shifted.and_then(|stamp| stamp.checked_sub(shift)) else {
         return refused(name, value, "a time");
-    }
+    };
     match MAX_DECIMALS.checked_sub(decimals) {
         Some(fewer) => Ok(nanoseconds.div_euclid(10_i64.pow(fewer.into()))),
         None => nanoseconds
             .checked_mul(10_i64.pow((decimals - MAX_DECIMALS).into()))
             .map_or_else(|| refused(name, value, "a time within the clock's range"), Ok),
     }
+}
+
+/// A text of date and time without its offset from UTC, and the offset: `Z`, or as `+01:00`. Nothing if it has none.
+fn offset_of(text: &str) -> Option<(&str, &str)> {
+    let clock = text.find(['T', 't', ' ', ':'])?;
+    let sign = text.get(clock..)?.find(['Z', 'z', '+', '-'])?;
+    let (plain, offset) = text.split_at_checked(clock + sign)?;
+    Some((plain.trim_end(), offset))
 }

@@ -7,7 +7,7 @@ use crate::parts::Parts;
 use crate::seat::{Seat, Sends};
 use crate::table::{Table, doubles};
 use arrow_array::{ArrayRef, Int64Array, StringArray};
-use fewbits_core::{Gaussian, Observation, SensorNode};
+use fewbits_core::{BitString, Gaussian, Observation, SensorNode};
 use fewbits_filters::centre::{CentreState, Event, Failures, FusionCentre, NoiseLearning, Slot};
 use fewbits_filters::smoother::smooth_step;
 use fewbits_filters::{Error, MomentFilter};
@@ -23,6 +23,8 @@ pub(crate) struct Built<const D: usize> {
     model: Moves<D>,
     nodes: Vec<Box<dyn SensorNode<1>>>,
     seats: Vec<Seat>,
+    /// Room for the slots of an instant.
+    slots: Vec<Slot>,
     /// Moments and schemes draw nothing.
     rng: Pcg64Mcg,
 }
@@ -79,6 +81,7 @@ impl<const D: usize> Built<D> {
             model,
             nodes: Vec::new(),
             seats: Vec::new(),
+            slots: Vec::new(),
             rng,
         };
         for seat in &parts.seats {
@@ -138,9 +141,14 @@ impl<const D: usize> Built<D> {
             return self.late(instant);
         }
         self.centre.advance(&mut self.rng, instant.seconds)?;
-        let mut slots = Vec::with_capacity(instant.samples.len());
+        let mut slots = std::mem::take(&mut self.slots);
+        slots.clear();
         for (number, sample) in &instant.samples {
-            let feedback = self.centre.feedback(*number as u32)?;
+            // Sensors that send values are told nothing.
+            let feedback = match self.seats[*number].send {
+                Sends::Value => BitString::default(),
+                _ => self.centre.feedback(*number as u32)?,
+            };
             let observation = match sample {
                 Some(sample) => {
                     let measurement = Vector1::new(sample - self.seats[*number].offset);
@@ -151,7 +159,9 @@ impl<const D: usize> Built<D> {
             slots.push(Slot::new(*number as u32, feedback, observation));
         }
         let bits = bits_of(&slots);
-        match self.centre.receive(&mut self.rng, &slots) {
+        let received = self.centre.receive(&mut self.rng, &slots);
+        self.slots = slots;
+        match received {
             Ok(received) => Ok(Row {
                 log_likelihood: received.info.log_likelihood,
                 bits,

@@ -452,3 +452,32 @@ def test_columns_of_nulls_without_a_type_are_gaps(library, tmp_path):
     assert np.array_equal(*results)
     grid = fb.GridFilter(lambda x, dt: x, lambda x, dt: 1.0, {"b": lambda x, z: -np.abs(x - z)}, lower=-9, upper=9, spacing=0.5, start=(0, 1))
     assert (grid.run(frame, time="t")["log_likelihood"] == 0).all()
+
+
+def test_offsets_from_utc_are_read_in_texts(tmp_path):
+    # NumPy warns of them; here warnings are errors.
+    frame = pl.DataFrame({"t": np.datetime64("2026-03-28T22:00:00", "ns") + np.arange(12) * np.timedelta64(1_800_000_000_000, "ns"), "x": np.arange(12.0)})
+    zoned = frame.with_columns(pl.col("t").dt.replace_time_zone("UTC"))
+    fb.write(zoned, tmp_path / "a.fewb", time="t")
+    for start, end in (
+        ("2026-03-29T00:00:00+01:00", "2026-03-29T04:00:00+02:00"),
+        ("2026-03-28T23:00:00Z", "2026-03-29 02:00:00Z"),
+        ("2026-03-28T17:30:00.000000000-05:30", "2026-03-29T02:00:00"),
+    ):
+        assert fb.read(tmp_path / "a.fewb", start=start, end=end)["x"].tolist() == [2, 3, 4, 5, 6, 7], start
+    with pytest.raises(fb.ArgumentError, match="offset"):
+        fb.read(tmp_path / "a.fewb", start="2026-03-29T00:00:00+99:00")
+    fb.write(frame, tmp_path / "b.fewb", time="t")
+    with pytest.raises(fb.ArgumentError, match="without a zone"):
+        fb.read(tmp_path / "b.fewb", start="2026-03-29T00:00:00+01:00")
+    with fb.Recorder(tmp_path / "c.fewb", {"x": "±0.1"}, utc=True, decimals=9) as recorder:
+        recorder.push("2026-03-29T00:00:00.123456789+01:00", {"x": 1.0})
+    assert fb.read(tmp_path / "c.fewb")["time"][0] == np.datetime64("2026-03-28T23:00:00.123456789")
+
+
+def test_objects_of_python_are_named():
+    rows = pl.DataFrame([{"t": np.datetime64("2026-01-01"), "x": 1.0}])
+    if rows.schema["t"] != pl.Object:
+        pytest.skip("polars reads NumPy's times in rows")
+    with pytest.raises(fb.ArgumentError, match="'t' of Python objects"):
+        fb.fit(rows, time="t")

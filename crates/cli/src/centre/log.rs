@@ -7,7 +7,7 @@ use crate::report::Report;
 use crate::say::say;
 use fewbits_core::Observation;
 use fewbits_link::{Counts, Output, Station};
-use fewbits_protocol::{Note, Receiver};
+use fewbits_protocol::{Note, Receiver, Slot};
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
@@ -26,12 +26,22 @@ pub(super) struct Log {
     all: Counts,
     of_sensors: Vec<Counts>,
     next: Instant,
+    /// Count of the last slot.
+    last: u64,
     slots: u64,
     passed: u64,
     reports: u64,
     /// Numbers of the sensors that reported.
     heard: BTreeSet<u32>,
     silence_said: bool,
+}
+
+/// The slot that a note names.
+fn slot_of(note: &Note) -> Option<Slot> {
+    match *note {
+        Note::Late { slot } | Note::Duplicate { slot } | Note::Disagreement { slot } => Some(slot),
+        _ => None,
+    }
 }
 
 /// Says how many frames with the numbers of sensors were refused: of each sensor, or in one line if there are many.
@@ -56,12 +66,18 @@ impl Log {
             notes: Limiter::default(),
             all: Counts::default(),
             next: Instant::now() + FIRST,
+            last: 0,
             slots: 0,
             passed: 0,
             reports: 0,
             heard: BTreeSet::new(),
             silence_said: false,
         }
+    }
+
+    /// The count of a slot, as the rows have it: frames carry 24 bits of it.
+    fn count(&self, slot: Slot) -> u64 {
+        slot.nearest_count(self.last)
     }
 
     fn number(&self, sensor: usize) -> u32 {
@@ -73,6 +89,7 @@ impl Log {
         match output {
             Output::Step(step) => {
                 self.slots += 1;
+                self.last = step.slot;
                 for (number, observed) in self.numbers.iter().zip(&step.observed) {
                     if matches!(observed, Observation::Received(_)) {
                         self.reports += 1;
@@ -104,6 +121,7 @@ impl Log {
             }
             Output::Passed { slot, reason } => {
                 self.passed += 1;
+                self.last = *slot;
                 self.notes.say("passed", &format!("slot {slot} passed: {reason}"));
             }
             Output::ClockBehind { wait } => {
@@ -122,7 +140,7 @@ impl Log {
                 sensor,
                 note: Note::Malformed { slot },
             } => {
-                let (number, slot) = (self.number(*sensor), slot.number());
+                let (number, slot) = (self.number(*sensor), self.count(*slot));
                 let text = format!(
                     "sensor {number}: a report of another length, slot {slot}: `report` must be the same in its file and here"
                 );
@@ -132,7 +150,7 @@ impl Log {
                 sensor,
                 note: Note::OtherMeaning { slot, found },
             } => {
-                let (number, slot) = (self.number(*sensor), slot.number());
+                let (number, slot) = (self.number(*sensor), self.count(*slot));
                 let own = self.kinds.get(*sensor);
                 let text = match own.and_then(|own| Some((own.word(), own.named(*found)?))) {
                     Some((own, other)) => format!(
@@ -146,6 +164,10 @@ impl Log {
             Output::Note { sensor, note } => {
                 let (number, text) = (self.number(*sensor), note.to_string());
                 let kind = text.split(',').next().unwrap_or_default();
+                let text = match slot_of(note) {
+                    Some(slot) => format!("{kind}, slot {}", self.count(slot)),
+                    None => text.clone(),
+                };
                 self.notes.say_of(kind, number, &format!("sensor {number}: {text}"));
             }
             _ => {}
