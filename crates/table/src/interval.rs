@@ -1,5 +1,6 @@
 //! Units of times in names of columns, as of `time_ms`, `Time [us]`, `elapsedMs` and `t/h`.
 
+use crate::hint::without_unit;
 use crate::time::Unit;
 
 /// Unit of times that are numbers, as `--time-format` says it.
@@ -58,8 +59,8 @@ pub(crate) fn of_name(name: &str) -> Option<(&'static str, &str)> {
 
 /// The number and the unit of a time that is spelled with one, as `1.5 sec` and `3 min`.
 pub(crate) fn spelled(cell: &str) -> Option<(&str, &'static str)> {
-    let (unit, rest) = of_name(cell)?;
-    let number = rest.trim_end();
+    let (number, word) = without_unit(cell)?;
+    let (unit, _) = of_name(word).filter(|(_, rest)| rest.is_empty())?;
     number
         .parse::<f64>()
         .is_ok_and(f64::is_finite)
