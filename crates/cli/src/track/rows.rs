@@ -13,6 +13,8 @@ use fewbits_record::TimeBase;
 use fewbits_table::Side;
 use std::collections::VecDeque;
 
+/// Smallest number of seconds that is proposed for rows that come late.
+const LATE: f64 = 60.0;
 /// Times above these are not seconds since 1970 but fractions of a second: the number of them in one second.
 const PARTS_OF_A_SECOND: [(f64, f64); 3] = [(1e17, 1e9), (1e14, 1e6), (4e9, 1e3)];
 

@@ -274,14 +274,16 @@ fn by_brute_force(instants: &[Instant], change: f64, noise: f64) -> f64 {
     const NODES: usize = 501;
     let spacing = 0.01;
     let place = |i: usize| 20.0 + spacing * (i as f64 - 250.0);
-    let normal = |x: f64, deviation: f64| (-0.5 * (x / deviation).powi(2)).exp() / (deviation * std::f64::consts::TAU.sqrt());
+    let normal =
+        |x: f64, deviation: f64| (-0.5 * (x / deviation).powi(2)).exp() / (deviation * std::f64::consts::TAU.sqrt());
     let mut density: Vec<f64> = (0..NODES).map(|i| spacing * normal(place(i) - 20.0, 0.5)).collect();
     let mut total = 0.0;
     for (row, instant) in instants.iter().enumerate() {
         if row > 0 {
             let from = |i: usize| {
                 let near = i.saturating_sub(60)..(i + 61).min(NODES);
-                near.map(|j| density[j] * spacing * normal(place(i) - place(j), change)).sum::<f64>()
+                near.map(|j| density[j] * spacing * normal(place(i) - place(j), change))
+                    .sum::<f64>()
             };
             density = (0..NODES).map(from).collect();
         }
@@ -296,7 +298,12 @@ fn by_brute_force(instants: &[Instant], change: f64, noise: f64) -> f64 {
         let range = range(instants);
         let weigh = |(i, p): (usize, &mut f64)| {
             let (right, wild) = said(place(i));
-            *p *= right + if wild == 0.002 { wild / range } else { (wild / range).min(0.002) };
+            *p *= right
+                + if wild == 0.002 {
+                    wild / range
+                } else {
+                    (wild / range).min(0.002)
+                };
         };
         density.iter_mut().enumerate().for_each(weigh);
         let sum: f64 = density.iter().sum();
@@ -333,18 +340,30 @@ fn the_likelihood_on_a_grid_is_that_of_brute_force() {
             }
         };
         let values = vec![(0, reading)];
-        instants.push(Instant { seconds: f64::from(row), values });
+        instants.push(Instant {
+            seconds: f64::from(row),
+            values,
+        });
     }
     let prior = Gaussian::scalar(20.0, 0.25).unwrap();
     let world = |change: f64| ContinuousLinear::random_walk(change * change);
-    let level = Level { world, prior: &prior, period: None };
+    let level = Level {
+        world,
+        prior: &prior,
+        period: None,
+    };
     for (change, deviation) in [(0.08, 0.05), (0.05, 0.1), (0.15, 0.03)] {
         let of = |number: f64| Number::Known(number);
-        let found = level.calibrate_on_grid(&instants, of(change), &[of(deviation)]).unwrap().log_likelihood;
+        let found = level
+            .calibrate_on_grid(&instants, of(change), &[of(deviation)])
+            .unwrap()
+            .log_likelihood;
         let exact = by_brute_force(&instants, change, deviation);
         assert!((found - exact).abs() < 0.3, "{change} {deviation}: {found} {exact}");
     }
     // The moments miss by far more, and lead elsewhere.
-    let moments = level.calibrate(&instants, Number::Known(0.05), &[Number::Known(0.1)]).unwrap();
+    let moments = level
+        .calibrate(&instants, Number::Known(0.05), &[Number::Known(0.1)])
+        .unwrap();
     assert!((moments.log_likelihood - by_brute_force(&instants, 0.05, 0.1)).abs() > 1.0);
 }

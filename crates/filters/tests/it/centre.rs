@@ -371,7 +371,8 @@ fn a_burst_of_wild_values_reopens_nothing() {
     for kind in ["different", "same"] {
         let mut rng = Stream::new(9).rng();
         let walk = ContinuousLinear::random_walk(0.001).unwrap();
-        let mut centre = FusionCentre::new(&mut rng, walk, MomentFilter, &Gaussian::scalar(20.0, 1.0).unwrap()).unwrap();
+        let mut centre =
+            FusionCentre::new(&mut rng, walk, MomentFilter, &Gaussian::scalar(20.0, 1.0).unwrap()).unwrap();
         let (sensing, scheme) = (LinearSensor::direct(0.01).unwrap(), FullValue::new(0.01).unwrap());
         centre
             .join(0, Reporting::values(sensing, scheme, Link::PERFECT))
