@@ -5,21 +5,49 @@ use fewbits_core::{Belief, Density, Gaussian, GaussianDynamics, Likelihood};
 use fewbits_densities::{PointMass, UniformGrid};
 use nalgebra::Vector1;
 
-/// Nodes of a new grid, and most nodes before it is made coarser.
-const NODES: usize = 241;
-const MAX_NODES: usize = 800;
-/// A Gaussian is represented to so many deviations on each side.
-const REACH: f64 = 6.0;
-/// Distance between nodes in deviations of the noise of the dynamics, at least and at most, where the noise is spread over nodes.
-const FINEST: f64 = 0.125;
+/// How fine a grid is.
+pub(crate) struct Resolution {
+    /// Nodes of a new grid, and most nodes before it is made coarser.
+    nodes: usize,
+    max_nodes: usize,
+    /// A Gaussian is represented to so many deviations on each side.
+    reach: f64,
+    /// Smallest distance between nodes in deviations of the noise of the dynamics.
+    finest: f64,
+    /// Mass beyond either end that is cut off.
+    cut: f64,
+    /// A posterior on fewer nodes than this (the inverse of the sum of squares) is computed again on a finer grid.
+    resolved: f64,
+    /// A finer grid covers the nodes with more than this share of the largest posterior.
+    covered: f64,
+}
+
+/// That of a filter.
+pub(crate) const FINE: Resolution = Resolution {
+    nodes: 241,
+    max_nodes: 800,
+    reach: 6.0,
+    finest: 0.125,
+    cut: 1e-13,
+    resolved: 16.0,
+    covered: 1e-12,
+};
+
+/// That of a search, which computes the likelihood of a whole table some hundred times.
+pub(crate) const QUICK: Resolution = Resolution {
+    nodes: 49,
+    max_nodes: 160,
+    reach: 4.0,
+    finest: 0.5,
+    cut: 1e-7,
+    resolved: 5.0,
+    covered: 1e-6,
+};
+
+/// Largest distance between nodes at which the shape of the dynamics' noise is spread over nodes, in its deviations.
 const COARSEST: f64 = 1.0;
-/// Mass beyond either end that is cut off.
-const CUT: f64 = 1e-13;
-/// A posterior on fewer nodes than this (the inverse of the sum of squares) is computed again on a finer grid, so often at most.
-const RESOLVED: f64 = 16.0;
+/// A grid is made finer so often at most, and covers some nodes beside those that matter.
 const PASSES: usize = 40;
-/// A finer grid covers the nodes with more than this share of the largest posterior, and some to each side.
-const COVERED: f64 = 1e-12;
 const BESIDE: usize = 2;
 
 /// Masses of equidistant nodes, of any sum.
@@ -38,8 +66,8 @@ impl Masses {
     }
 
     /// Without the nodes at the ends that have no mass.
-    fn cut(mut self) -> Self {
-        let negligible = CUT * self.masses.iter().sum::<f64>();
+    fn cut(mut self, share: f64) -> Self {
+        let negligible = share * self.masses.iter().sum::<f64>();
         let beyond = |masses: &mut dyn Iterator<Item = &f64>| {
             let mut sum = 0.0;
             masses
@@ -77,17 +105,25 @@ impl Masses {
     }
 
     /// The sum with independent noise of this variance.
-    fn with_noise(self, variance: f64) -> Self {
+    fn with_noise(self, variance: f64, resolution: &Resolution) -> Self {
+        let Resolution {
+            nodes,
+            max_nodes,
+            reach,
+            finest,
+            cut,
+            ..
+        } = *resolution;
         let deviation = variance.sqrt();
         let mut grid = self;
         if deviation.is_nan() || deviation <= 0.0 {
             return grid;
         }
-        if grid.spacing < FINEST * deviation {
-            grid = grid.coarser(FINEST * deviation);
+        if grid.spacing < finest * deviation {
+            grid = grid.coarser(finest * deviation);
         }
-        if grid.masses.len() > MAX_NODES {
-            let spacing = grid.spacing * grid.masses.len() as f64 / NODES as f64;
+        if grid.masses.len() > max_nodes {
+            let spacing = grid.spacing * grid.masses.len() as f64 / nodes as f64;
             grid = grid.coarser(spacing);
         }
         let ratio = grid.spacing / deviation;
@@ -96,7 +132,7 @@ impl Masses {
             let side = 0.5 / (ratio * ratio);
             vec![side, 1.0 - 2.0 * side, side]
         } else {
-            let half = (REACH / ratio).ceil() as i32;
+            let half = (reach / ratio).ceil() as i32;
             let weights = (-half..=half).map(|k| (-0.5 * (f64::from(k) * ratio).powi(2)).exp());
             let weights: Vec<f64> = weights.collect();
             let sum: f64 = weights.iter().sum();
@@ -114,20 +150,20 @@ impl Masses {
             spacing: grid.spacing,
             masses,
         }
-        .cut()
+        .cut(cut)
     }
 }
 
 /// The Gaussian on a grid of its own width.
-pub(crate) fn start(law: &Gaussian<1>) -> Result<PointMass, Error> {
+pub(crate) fn start(law: &Gaussian<1>, Resolution { nodes, reach, .. }: &Resolution) -> Result<PointMass, Error> {
     let (mean, deviation) = (law.mean()[0], law.covariance()[0].sqrt());
     // What is known for certain is a grid of no width that matters.
     let deviation = deviation.max(1e-9 * mean.abs()).max(f64::MIN_POSITIVE.sqrt());
-    let half = 0.5 * (NODES as f64 - 1.0);
-    let step = REACH / half;
-    let masses = (0..NODES).map(|i| (-0.5 * ((i as f64 - half) * step).powi(2)).exp());
+    let half = 0.5 * (*nodes as f64 - 1.0);
+    let step = reach / half;
+    let masses = (0..*nodes).map(|i| (-0.5 * ((i as f64 - half) * step).powi(2)).exp());
     let masses = Masses {
-        first: mean - REACH * deviation,
+        first: mean - reach * deviation,
         spacing: step * deviation,
         masses: masses.collect(),
     };
@@ -135,7 +171,11 @@ pub(crate) fn start(law: &Gaussian<1>) -> Result<PointMass, Error> {
 }
 
 /// The belief after dynamics that are linear over its width.
-pub(crate) fn predicted(belief: &PointMass, dynamics: &dyn GaussianDynamics<1>) -> Result<PointMass, Error> {
+pub(crate) fn predicted(
+    belief: &PointMass,
+    dynamics: &dyn GaussianDynamics<1>,
+    resolution: &Resolution,
+) -> Result<PointMass, Error> {
     let mean = Belief::mean(belief);
     let slope = dynamics.jacobian(&mean)[0];
     let to = dynamics.mean(&mean)[0];
@@ -144,7 +184,7 @@ pub(crate) fn predicted(belief: &PointMass, dynamics: &dyn GaussianDynamics<1>) 
     let spacing = grid.spacing() * slope.abs();
     // What is forgotten leaves a point.
     if spacing <= f64::MIN_POSITIVE.sqrt() {
-        return start(&Gaussian::new(Vector1::new(to), noise)?);
+        return start(&Gaussian::new(Vector1::new(to), noise)?, resolution);
     }
     let mut masses = belief.density().to_vec();
     let mut first = grid.node(0);
@@ -157,11 +197,22 @@ pub(crate) fn predicted(belief: &PointMass, dynamics: &dyn GaussianDynamics<1>) 
         spacing,
         masses,
     };
-    moved.with_noise(noise[0]).belief()
+    moved.with_noise(noise[0], resolution).belief()
 }
 
 /// The posterior on a grid that resolves it, and the log-likelihood of the observations.
-pub(crate) fn updated(belief: &PointMass, observed: &[&dyn Likelihood<1>]) -> Result<(PointMass, f64), Error> {
+pub(crate) fn updated(
+    belief: &PointMass,
+    observed: &[&dyn Likelihood<1>],
+    resolution: &Resolution,
+) -> Result<(PointMass, f64), Error> {
+    let Resolution {
+        nodes,
+        cut,
+        resolved,
+        covered,
+        ..
+    } = *resolution;
     let mut prior = belief.clone();
     // Logarithm of the mass of the belief that the present grid covers.
     let mut log_covered = 0.0;
@@ -171,26 +222,26 @@ pub(crate) fn updated(belief: &PointMass, observed: &[&dyn Likelihood<1>]) -> Re
         let log_likelihood = posterior.update(observed)?;
         let (density, h) = (posterior.density(), posterior.grid().spacing());
         let squares: f64 = density.iter().map(|p| (p * h).powi(2)).sum();
-        let covered = COVERED * density.iter().copied().fold(0.0, f64::max);
-        let is_covered = |p: &f64| *p > covered;
+        let least = covered * density.iter().copied().fold(0.0, f64::max);
+        let is_covered = |p: &f64| *p > least;
         let low = density.iter().position(is_covered).unwrap_or(0).saturating_sub(BESIDE);
         let high = density.iter().rposition(is_covered).unwrap_or(0) + BESIDE;
         let high = high.min(density.len() - 1);
-        let spacing = h * (high - low) as f64 / (NODES - 1) as f64;
+        let spacing = h * (high - low) as f64 / (nodes - 1) as f64;
         // It is resolved, or the grid cannot be finer.
-        if RESOLVED * squares <= 1.0 || pass == PASSES || spacing >= h {
-            let resolved = Masses {
+        if resolved * squares <= 1.0 || pass == PASSES || spacing >= h {
+            let found = Masses {
                 first: posterior.grid().node(0),
                 spacing: h,
                 masses: posterior.density().to_vec(),
             };
-            return Ok((resolved.cut().belief()?, log_covered + log_likelihood));
+            return Ok((found.cut(cut).belief()?, log_covered + log_likelihood));
         }
-        let grid = UniformGrid::from_nodes(prior.grid().node(low), spacing, NODES)?;
+        let grid = UniformGrid::from_nodes(prior.grid().node(low), spacing, nodes)?;
         // The density between nodes is a line from each to the next.
         let mut finer = PointMass::new(grid, |_| 0.0)?;
         let mean_density = finer.update_with(|x| prior.log_density(&Vector1::new(x)))?;
-        log_covered += mean_density + (grid.spacing() * NODES as f64).ln();
+        log_covered += mean_density + (grid.spacing() * nodes as f64).ln();
         prior = finer;
         pass += 1;
     }

@@ -1,7 +1,7 @@
 //! The exact filter of a number on a grid, the reference for approximate filters.
 
 use crate::contract::{Info, StateFilter};
-use crate::moving_grid;
+use crate::moving_grid::{self, FINE};
 use crate::transition_kernel::{TransitionKernel, moved};
 use crate::{Error, Points};
 use fewbits_core::{Gaussian, GaussianDynamics, Likelihood};
@@ -60,7 +60,7 @@ impl StateFilter<1> for PointMassFilter {
     fn start(&mut self, _: &mut dyn Rng, prior: &Gaussian<1>) -> Result<PointMass, Error> {
         match &self.0 {
             Region::Fixed { grid, .. } => PointMass::normal(*grid, prior.mean()[0], prior.covariance()[0]),
-            Region::Following => moving_grid::start(prior),
+            Region::Following => moving_grid::start(prior, &FINE),
         }
     }
 
@@ -84,7 +84,7 @@ impl StateFilter<1> for PointMassFilter {
                 *belief = used.predict(belief)?;
                 (*known, *kernel) = (next, Some(used));
             }
-            Region::Following => *belief = moving_grid::predicted(belief, dynamics)?,
+            Region::Following => *belief = moving_grid::predicted(belief, dynamics, &FINE)?,
         }
         Ok(())
     }
@@ -98,7 +98,7 @@ impl StateFilter<1> for PointMassFilter {
         match &self.0 {
             Region::Fixed { .. } => Ok(Info::new(belief.update(observed)?)),
             Region::Following => {
-                let (posterior, log_likelihood) = moving_grid::updated(belief, observed)?;
+                let (posterior, log_likelihood) = moving_grid::updated(belief, observed, &FINE)?;
                 *belief = posterior;
                 Ok(Info::new(log_likelihood))
             }

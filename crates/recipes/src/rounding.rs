@@ -5,6 +5,8 @@ const COARSE: f64 = 0.75;
 /// Values from which a step is found, at least, and changes from one to the next among them.
 const FEWEST: usize = 50;
 const FEWEST_CHANGES: usize = 4;
+/// Share of the changes that are multiples of the step.
+const MULTIPLES: f64 = 0.9;
 /// Standard deviation of rounding to a step, in steps.
 pub const DEVIATION: f64 = 0.288_675_134_594_812_9;
 
@@ -17,8 +19,17 @@ pub fn step(values: &[f64]) -> Option<f64> {
     });
     let step = fewbits_adaptive::own_steps(values).into_iter().reduce(f64::min)?;
     let is_known = values.windows(2).filter(|pair| pair[0] != pair[1]).count() >= FEWEST_CHANGES;
+    // Values far from each other, as those that a sensor sends on change, are no multiples of their smallest difference.
+    let slack = decimals.unwrap_or(1e-6 * step);
+    let is_multiple = |pair: &&[f64]| {
+        let apart = (pair[1] - pair[0]).abs();
+        let count = (apart / step).round();
+        (apart - count * step).abs() <= slack * (1.0 + count)
+    };
+    let pairs = values.windows(2);
+    let is_lattice = pairs.clone().filter(is_multiple).count() as f64 >= MULTIPLES * pairs.len() as f64;
     Some(match decimals {
-        Some(unit) if is_known => unit.max(step),
+        Some(unit) if is_known && is_lattice => unit.max(step),
         Some(unit) => unit.min(step),
         None => step,
     })
@@ -34,6 +45,19 @@ pub fn coarse_step(values: &[f64], noise: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Defect: the smallest change of values that are sent on change, far above their rounding, was taken for a step of rounding.
+    #[test]
+    fn values_far_from_each_other_have_the_step_of_their_decimals() {
+        let sent = (0..20).map(|k| f64::from(k) * 0.53 + 0.02 * (f64::from(k) * 1.3).sin());
+        let shown: Vec<f64> = sent.map(|value| (1e4 * value).round() * 1e-4).collect();
+        assert!(step(&shown).is_some_and(|step| step < 1.1e-4), "{:?}", step(&shown));
+        // Sixteenths that are shown with two decimals stay sixteenths.
+        let sixteenths: Vec<f64> = (0..60)
+            .map(|k| (100.0 * (f64::from(k * 7 % 40) / 16.0)).round() / 100.0)
+            .collect();
+        assert!(step(&sixteenths).is_some_and(|step| (step - 0.0625).abs() < 0.006), "{:?}", step(&sixteenths));
+    }
 
     #[test]
     fn a_step_is_found_where_it_is_coarser_than_the_noise() {

@@ -199,7 +199,8 @@ impl Settings {
             .world
             .calibrate(&readings, change, self.world.change, &noises)
             .map_err(refused)?;
-        if unknown.change && self.world.model == Model::Walk {
+        // Silence cuts the belief: that of a walk is followed exactly, and that of a slope is not.
+        if unknown.change && self.world.model == Model::Walk && !self.world.is_cut {
             // The same with a slope, which is only compared.
             let sloping = World {
                 model: Model::Velocity,

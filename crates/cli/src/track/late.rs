@@ -39,6 +39,11 @@ impl Late {
         self.rows.insert(at, row);
     }
 
+    /// How long after the newest row one came.
+    pub(super) fn lateness(&self, row: &Instant) -> f64 {
+        self.newest - row.seconds
+    }
+
     /// There are no more rows. Returns whether none waits.
     pub(super) fn end(&mut self) -> bool {
         self.has_ended = true;

@@ -13,6 +13,8 @@ use fewbits_record::TimeBase;
 use fewbits_table::Side;
 use std::collections::VecDeque;
 
+/// Smallest number of seconds that is proposed for rows that come late.
+const LATE: f64 = 60.0;
 /// Times above these are not seconds since 1970 but fractions of a second: the number of them in one second.
 const PARTS_OF_A_SECOND: [(f64, f64); 3] = [(1e17, 1e9), (1e14, 1e6), (4e9, 1e3)];
 
@@ -283,8 +285,10 @@ impl Instants {
             if let Some(found) = self.late.pop() {
                 return found.map(Some).map_err(|row| {
                     let problem = format!(
-                        "row {}: time {} is before that of a row that was used: a longer --late takes it in",
-                        row.row, row.time
+                        "row {}: time {} is before that of a row that was used: a longer --late takes it in, as --late {}s",
+                        row.row,
+                        row.time,
+                        self.late.lateness(&row).ceil()
                     );
                     Error::content(self.file(), problem)
                 });
@@ -295,6 +299,19 @@ impl Instants {
                 None => {}
             }
         }
+    }
+
+    /// How late the latest row is, of one at this time and those that follow it. The rest of a pipe is not waited for.
+    fn latest(&mut self, seconds: f64, first: i64) -> f64 {
+        let (mut newest, mut latest) = (self.last, self.last - seconds);
+        if self.file() != "-" {
+            while let Ok(Some((Some(tick), _))) = self.table.next(self.base) {
+                let seconds = (i128::from(tick) - i128::from(first)) as f64 * self.tick;
+                newest = newest.max(seconds);
+                latest = latest.max(newest - seconds);
+            }
+        }
+        latest
     }
 
     fn read_any_row(&mut self) -> Result<Option<Instant>, Error> {
@@ -317,7 +334,8 @@ impl Instants {
         if seconds < self.last && !self.late.is_waiting() {
             let row = self.table.row();
             let problem = format!(
-                "row {row}: time {time} is before that of the row above: sort the rows by time, or say how late rows may be, as --late 60s"
+                "row {row}: time {time} is before that of the row above: sort the rows by time, or say how late rows may be, as --late {}s",
+                self.latest(seconds, first).ceil().max(LATE)
             );
             return Err(Error::content(self.file(), problem));
         }

@@ -97,7 +97,12 @@ impl World {
             }
             _ => {
                 let (world, prior) = (|change| self.walk(change), &self.start(guess)?);
-                Level { world, prior, period }.calibrate(instants, change, noises)
+                let level = Level { world, prior, period };
+                if self.is_cut {
+                    level.calibrate_on_grid(instants, change, noises)
+                } else {
+                    level.calibrate(instants, change, noises)
+                }
             }
         }
     }

@@ -9,6 +9,7 @@
 //! wild. Offsets of sensors are another question: [`offsets`].
 
 mod offsets;
+mod on_grid;
 mod reading;
 
 pub use offsets::{median, offsets, shift_deviation};
@@ -130,12 +131,23 @@ where
     W: Fn(f64) -> Result<E, Error>,
     E: Evolution<D>,
 {
-    /// Finds the unknown numbers by maximum likelihood.
+    /// Finds the unknown numbers by maximum likelihood. The belief is a Gaussian with the moments of what was said.
     ///
     /// # Errors
     /// If an instant is before the one above it, names a sensor that `noises` does not have, or holds a value that is not finite; if a number
     /// or a guess is not positive; if all values are equal.
     pub fn calibrate(&self, instants: &[Instant], change: Number, noises: &[Number]) -> Result<Calibration, Error> {
+        self.search(instants, change, noises, Self::log_likelihood)
+    }
+
+    /// The search by a likelihood of all instants, given the range of the values, the change and the noises.
+    fn search(
+        &self,
+        instants: &[Instant],
+        change: Number,
+        noises: &[Number],
+        log_likelihood: impl Fn(&Self, &[Instant], f64, f64, &[f64]) -> Option<f64>,
+    ) -> Result<Calibration, Error> {
         change.check("change")?;
         noises.iter().try_for_each(|noise| noise.check("noises"))?;
         let mut counts = vec![0_usize; noises.len()];
@@ -162,7 +174,7 @@ where
             return refuse("seconds", pair[1].seconds, format!("{} or later", pair[0].seconds));
         }
         let log_likelihood = |change: f64, noises: &[f64]| {
-            let found = self.log_likelihood(instants, range, change, noises);
+            let found = log_likelihood(self, instants, range, change, noises);
             found.unwrap_or(f64::NEG_INFINITY)
         };
         let mut found = Search {

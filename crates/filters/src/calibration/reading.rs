@@ -3,7 +3,7 @@
 use super::wrapped;
 use crate::Error;
 use fewbits_numerics::error::{finite, positive, refuse};
-use fewbits_numerics::normal::truncated_moments;
+use fewbits_numerics::normal::{log_interval, truncated_moments};
 
 /// What a sensor says of its measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -116,6 +116,24 @@ impl Reading {
                     left: found.variance,
                     variance,
                 })
+            }
+        }
+    }
+
+    /// Density or probability of it, if the measurement without noise is `level`.
+    pub(super) fn given(&self, level: f64, noise: f64, period: Option<f64>) -> f64 {
+        match *self {
+            Self::Value { value, deviation } => {
+                let noise = deviation.unwrap_or(noise);
+                let score = wrapped(value - level, period) / noise;
+                (-0.5 * score * score).exp() / (std::f64::consts::TAU.sqrt() * noise)
+            }
+            Self::Within { lower, upper } => {
+                let shift = match (lower.is_finite() && upper.is_finite(), period) {
+                    (true, Some(_)) => wrapped(0.5 * (lower + upper) - level, period) - 0.5 * (lower + upper),
+                    _ => -level,
+                };
+                log_interval((lower + shift) / noise, (upper + shift) / noise).exp()
             }
         }
     }

@@ -149,6 +149,21 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         evidence.map_or(0.0, |evidence| evidence.log_likelihood).max(LOWEST)
     }
 
+    /// Whether a value is as near to the last one of its sensor as the prediction allows, and no repetition of a sensor that hardly ever repeats itself.
+    /// Words are not compared.
+    fn follows_its_last(&self, reading: &Reading<'_, D>, predicted: &Gaussian<D>) -> bool {
+        let member = &self.members[reading.seat];
+        if reading.content != Content::Report || member.state.is_out() {
+            return true;
+        }
+        let (Some((value, noise)), Some(spread)) =
+            (member.sensor.value(reading.slot), member.sensor.value_variance(predicted))
+        else {
+            return true;
+        };
+        member.state.repeats.agrees(value, spread + noise)
+    }
+
     /// A prediction wide enough that most of the reports that were rejected agree with it and with each other; `None` if there is none, or
     /// if it is too early to say.
     pub(super) fn reopened(
@@ -193,8 +208,13 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 reading.content != Content::Report || verdict.fate != Fate::Used || verdict.tested.tail() > FITS
             });
             if fits && 2 * agree > judged {
-                // One sensor alone may have sent a wild value. It must be off several times in a row.
-                return (agree > 1 || self.astray + 1 >= INSTANTS_ASTRAY).then_some((wide, again));
+                // One sensor alone may have sent wild values. It must be off several times in a row, and so often again if its values
+                // do not agree with each other.
+                let needed = match readings.iter().all(|reading| self.follows_its_last(reading, predicted)) {
+                    true => INSTANTS_ASTRAY,
+                    false => 2 * INSTANTS_ASTRAY,
+                };
+                return (agree > 1 || self.astray + 1 >= needed).then_some((wide, again));
             }
         }
         None

@@ -364,6 +364,31 @@ fn a_spike_is_rejected_and_a_jump_is_followed() {
     assert_eq!(reopened, 1);
 }
 
+/// Defect: four wild values in a row were believed, and the level was reopened at a wild value. Wild values differ from each other, or are all the
+/// same to the last digit; those of a level that has jumped do neither.
+#[test]
+fn a_burst_of_wild_values_reopens_nothing() {
+    for kind in ["different", "same"] {
+        let mut rng = Stream::new(9).rng();
+        let walk = ContinuousLinear::random_walk(0.001).unwrap();
+        let mut centre =
+            FusionCentre::new(&mut rng, walk, MomentFilter, &Gaussian::scalar(20.0, 1.0).unwrap()).unwrap();
+        let (sensing, scheme) = (LinearSensor::direct(0.01).unwrap(), FullValue::new(0.01).unwrap());
+        centre
+            .join(0, Reporting::values(sensing, scheme, Link::PERFECT))
+            .unwrap();
+        for k in 1..=120 {
+            centre.advance(&mut rng, f64::from(k)).unwrap();
+            let is_wild = (60..65).contains(&k);
+            let wild = if kind == "same" { 195.8 } else { 100.0 * noise(&mut rng) };
+            let sent = if is_wild { wild } else { 20.0 + 0.1 * noise(&mut rng) };
+            let events = centre.receive(&mut rng, &[slot(0, sent)]).unwrap().events;
+            assert!(!events.contains(&Event::Reopened), "{kind} {k}");
+            assert!((centre.estimate().mean()[0] - 20.0).abs() < 0.5, "{kind} {k}");
+        }
+    }
+}
+
 #[test]
 fn a_copy_of_a_report_is_dropped_and_counted() {
     let mut rng = Stream::new(8).rng();
