@@ -30,6 +30,7 @@ mod first;
 mod fit;
 mod found;
 mod height;
+mod held;
 mod hints;
 mod late;
 mod level;

@@ -2,6 +2,7 @@
 
 use super::applied::Correction;
 use super::columns::{Kind, Roles};
+use super::held::Held;
 use super::late::Late;
 use super::samples::Samples;
 use crate::arguments::TableOptions;
@@ -81,6 +82,8 @@ pub(super) struct Instants {
     late: Late,
     /// Measurements between rows.
     samples: Option<Samples>,
+    /// What is left out of rows because it only repeats.
+    held: Option<Held>,
 }
 
 impl Instants {
@@ -160,6 +163,7 @@ impl Instants {
             pending: None,
             late: Late::new(kind.late),
             samples: kind.sampled.map(Samples::new),
+            held: None,
         })
     }
 
@@ -186,7 +190,7 @@ impl Instants {
     /// Reads up to `count` instants without consuming them.
     pub(super) fn peek(&mut self, count: usize) -> Result<&VecDeque<Instant>, Error> {
         while self.ahead.len() < count {
-            match self.read_with_samples()? {
+            match self.read_new()? {
                 Some(instant) => self.ahead.push_back(instant),
                 None => break,
             }
@@ -198,8 +202,22 @@ impl Instants {
     pub(super) fn next(&mut self) -> Result<Option<Instant>, Error> {
         match self.ahead.pop_front() {
             Some(instant) => Ok(Some(instant)),
-            None => self.read_with_samples(),
+            None => self.read_new(),
         }
+    }
+
+    /// Leaves repetitions of columns that hold their values out of the rows that were read ahead and of all that follow. The sensors.
+    pub(super) fn leave_out_repetitions(&mut self) -> Vec<usize> {
+        self.held = Held::begin(&mut self.ahead, self.names.len());
+        self.held.iter().flat_map(Held::sensors).collect()
+    }
+
+    fn read_new(&mut self) -> Result<Option<Instant>, Error> {
+        let mut found = self.read_with_samples()?;
+        if let (Some(held), Some(row)) = (&mut self.held, &mut found) {
+            held.leave_out(row);
+        }
+        Ok(found)
     }
 
     /// Whether instants without a row are among those that are read.
@@ -345,7 +363,7 @@ impl Instants {
             .map(|place| cells.get(place?).copied().flatten().filter(|cell| cell.is_finite()));
         let places: Vec<usize> = (0..cells.len()).filter(|i| !self.own.contains(&Some(*i))).collect();
         let cells = places.iter().map(|i| (*i, cells[*i]));
-        let reports: Reports = if self.is_long {
+        let mut reports: Reports = if self.is_long {
             let label = self.table.label();
             let known = self.names.iter().position(|name| name == label);
             let sensor = known.unwrap_or_else(|| {
@@ -356,7 +374,6 @@ impl Instants {
         } else {
             cells.enumerate().map(|(sensor, (_, cell))| (sensor, cell)).collect()
         };
-        let mut reports = reports;
         if !self.corrections.is_empty() {
             for (sensor, cell) in &mut reports {
                 let name = self.names.get(*sensor);

@@ -131,6 +131,12 @@ impl Settings {
                 rows = (2 * rows).min(most);
             }
         }
+        let may_hold = !known && !options.reports && options.silent_within.is_none() && options.table.by.is_none();
+        let held = if may_hold {
+            instants.leave_out_repetitions()
+        } else {
+            Vec::new()
+        };
         let first: Vec<Instant> = instants.peek(rows)?.iter().cloned().collect();
         if first.is_empty() {
             return Err(Error::empty(instants.file(), "rows"));
@@ -138,6 +144,13 @@ impl Settings {
         let sensors = instants.names.len();
         let has_negative = (0..sensors).any(|sensor| values_of(&first, sensor).iter().any(|value| *value < 0.0));
         let mut told = instants.roles.told.clone();
+        told.extend(held.iter().map(|sensor| {
+            format!(
+                "{} repeats its values in the rows that follow them: repetitions are left out, since they are no measurements; --noise, \
+                 --change and --prior together keep them",
+                instants.names[*sensor]
+            )
+        }));
         let period = match options.period.as_deref() {
             Some("no") => None,
             Some(text) => Some(above_zero("--period", text, "a period above 0, as 360, or `no`")?),

@@ -292,3 +292,39 @@ fn late_rows_are_sorted_in() {
         assert!(message.contains(part), "{message}");
     }
 }
+
+/// Defect: a table that is written more often than its sensor measures holds each value for some rows. Repetitions were taken for measurements, and
+/// the bands held a third of the truths.
+#[test]
+fn repetitions_of_held_values_are_no_measurements() {
+    for (times, seed) in [(2, 81), (2, 82), (5, 83)] {
+        let mut numbers = Numbers(seed);
+        let (mut table, mut truth) = ("time,a,b\n".to_owned(), Vec::new());
+        let (mut level, mut kept) = (20.0_f64, 0.0);
+        for row in 0..1200 {
+            level += 0.02 * numbers.normal();
+            // The other column measures in every row, six times as noisy.
+            let other = level + 1.8 * numbers.normal();
+            if row % times == 0 {
+                kept = level + 0.3 * numbers.normal();
+            }
+            table += &format!("{},{kept:.4},{other:.4}\n", 10 * row);
+            truth.push(level);
+        }
+        let (rows, summary) = tracked(&table, &[]);
+        assert!(has_hint(&summary, "a repeats its values") && !has_hint(&summary, "b repeats"), "{summary}");
+        let share = rows
+            .iter()
+            .zip(&truth)
+            .filter(|(row, level)| held(row, **level))
+            .count() as f64
+            / 1200.0;
+        assert!(rows.len() == 1200 && (0.88..=0.995).contains(&share), "{times} {seed}: {share}");
+        assert!(
+            summary["sensors"][0]["reports"]
+                .as_u64()
+                .is_some_and(|count| count == 1200 / times),
+            "{summary}"
+        );
+    }
+}

@@ -1,7 +1,7 @@
 //! Error against bits, transmitted bits and joules: every scheme on the same worlds.
 
 use super::schemes;
-use super::worlds::{self, Bill, COEFFICIENT, Entry};
+use super::worlds::{self, Bill, Entry, floor_at};
 use crate::prelude::*;
 
 parameters! {
@@ -35,12 +35,6 @@ rows! {
 }
 
 pub struct Frontier;
-
-/// Least root mean squared error at `rate` bits a slot: the error of the Kalman filter of all measurements, and on top the causal
-/// rate-distortion function of its estimate, an AR(1) process of innovation variance `before - after`.
-fn floor_at(rate: f64, [before, after]: [f64; 2]) -> f64 {
-    (after + (before - after) / (4.0_f64.powf(rate) - COEFFICIENT * COEFFICIENT)).sqrt()
-}
 
 fn marks(rows: &[Row], of: impl Fn(&Row) -> f64) -> Vec<Answer> {
     let beaten = |row: &Row| {
@@ -188,41 +182,5 @@ impl Figure for Frontier {
             }
         }
         Plot::grid(2, panels)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-    use fewbits_network::{Radio, TWO_AA_CELLS};
-
-    #[test]
-    fn without_bits_the_floor_is_the_stationary_variance_and_with_many_the_kalman_filter() {
-        let stationary = worlds::PROCESS / (1.0 - COEFFICIENT * COEFFICIENT);
-        let both = worlds::scalar(1).unwrap().everything().unwrap();
-        assert!((floor_at(0.0, both).powi(2) / stationary - 1.0).abs() < 1e-9);
-        assert!((floor_at(60.0, both).powi(2) / both[1] - 1.0).abs() < 1e-9);
-    }
-
-    /// Days on two AA cells of the busiest sensor (CC2420), whose rest takes `watts`: at a slot a second and 6 mW the scheme hardly matters, at
-    /// fifty a second and 0.1 mW it decides.
-    #[test]
-    fn the_scheme_decides_the_life_of_nodes_that_sleep() {
-        let entries = schemes::of_scalar(&worlds::scalar(200).unwrap()).unwrap();
-        let asleep = Radio::cc2420(0.0).unwrap().sleep.value();
-        let days = |family: &str, setting: &str, period: f64, watts: f64| {
-            let same = |e: &&Entry| (e.family, e.setting.as_str()) == (family, setting) && e.feedback != "told";
-            let energy = entries.iter().find(same).unwrap().run(Stream::new(1)).unwrap().busiest;
-            assert!(energy > 0.0);
-            TWO_AA_CELLS.value() / (watts + asleep + energy / period) / 86_400.0
-        };
-        let slow = days("CFwMD", "n=0.25", 1.0, 6e-3) / days("all-send", "32 bit", 1.0, 6e-3);
-        assert!((slow - 1.0).abs() < 0.05, "{slow}");
-        let fast = |family, setting| days(family, setting, 0.02, 1e-4);
-        // Who must listen before it sends one bit dies before one that sends 32 unasked, who sends one bit unasked after it.
-        let (asked, unasked, whole) =
-            (fast("Dymbo", "K=4"), fast("Lloyd-Max-table", "L=2"), fast("all-send", "32 bit"));
-        assert!(asked < whole && whole < unasked, "{asked} {whole} {unasked}");
     }
 }

@@ -147,12 +147,21 @@ impl Entry {
     }
 }
 
+/// Least root mean squared error at `rate` bits a slot: the error of the Kalman filter of all measurements, and on top the causal
+/// rate-distortion function of its estimate, an AR(1) process of innovation variance `before - after`.
+pub fn floor_at(rate: f64, [before, after]: [f64; 2]) -> f64 {
+    (after + (before - after) / (4.0_f64.powf(rate) - COEFFICIENT * COEFFICIENT)).sqrt()
+}
+
 /// A scheme and its setting.
 pub(super) type Name = (&'static str, String);
 
 impl<const D: usize, G: LinearDynamics<D> + Clone + Send + Sync + 'static> World<D, G> {
     /// The least squared error of all measurements, by the Kalman filter that has them all: before and after those of a slot.
-    pub(super) fn everything(&self) -> Result<[f64; 2], Error> {
+    ///
+    /// # Errors
+    /// If a covariance is singular.
+    pub fn everything(&self) -> Result<[f64; 2], Error> {
         let of = |b: &Gaussian<D>| self.counted.iter().map(|i| b.covariance()[(*i, *i)]).sum();
         let (mut belief, mut last) = (self.start, [0.0; 2]);
         for _ in 0..500 {

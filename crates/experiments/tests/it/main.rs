@@ -5,6 +5,7 @@
 mod cfwmd;
 mod dymbo;
 mod handoff;
+mod network;
 
 use fewbits_experiments::{Context, Error, Measured, reference};
 use fewbits_monte_carlo::Trial;

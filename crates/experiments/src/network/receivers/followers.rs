@@ -43,7 +43,8 @@ impl<G, S, const D: usize> Followers<G, S, D> {
 /// What the centre of [`Followers`] knows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Followed<const D: usize> {
-    pub(super) receivers: Vec<Receiver>,
+    /// The receivers' halves of the adaptive encoders, one for each sensor.
+    pub receivers: Vec<Receiver>,
     state: Gaussian<D>,
 }
 

@@ -3,8 +3,6 @@
 mod followers;
 mod look_up;
 mod mixed;
-#[cfg(test)]
-mod tests;
 
 pub use followers::{Followed, Followers};
 pub use look_up::LookUp;

@@ -1,15 +1,19 @@
-//! Receivers of the comparison over networks: against themselves without one, and under losses.
+//! Schemes of the comparison over networks: receivers against themselves without a network and under losses, floors, lives of nodes.
 
-use super::{Followers, LookUp, each};
 use fewbits_adaptive::{Config, Receiver as Following, Sensor};
 use fewbits_baselines::over_bits::{Estimator, OverBits};
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, PatternSensor, Source};
 use fewbits_core::factor::Levels;
 use fewbits_core::{Cell, Dynamics, Gaussian, Observation, Sensing, SensorNode};
+use fewbits_experiments::network::receivers::{Followers, LookUp, each};
+use fewbits_experiments::network::schemes;
+use fewbits_experiments::network::worlds::{self, COEFFICIENT, Entry, floor_at};
 use fewbits_filters::{assumed_density, kalman};
 use fewbits_models::{Ar1, LinearSensor};
 use fewbits_monte_carlo::Stream;
-use fewbits_network::{BitStar, Channel, Clock, Fault, FaultKind, Field, Radio, Seconds, SensorId, Setup, Simulator};
+use fewbits_network::{
+    BitStar, Channel, Clock, Fault, FaultKind, Field, Radio, Seconds, SensorId, Setup, Simulator, TWO_AA_CELLS,
+};
 use fewbits_protocol::{Feedback, ReportLength};
 use fewbits_quantizer_design::decoder::MmseDecoder;
 use fewbits_quantizer_design::{ObservationModel, System};
@@ -196,4 +200,32 @@ fn followed_signals_survive_faults() {
         }
     }
     assert_eq!(followed, 60);
+}
+
+#[test]
+fn without_bits_the_floor_is_the_stationary_variance_and_with_many_the_kalman_filter() {
+    let stationary = worlds::PROCESS / (1.0 - COEFFICIENT * COEFFICIENT);
+    let both = worlds::scalar(1).unwrap().everything().unwrap();
+    assert!((floor_at(0.0, both).powi(2) / stationary - 1.0).abs() < 1e-9);
+    assert!((floor_at(60.0, both).powi(2) / both[1] - 1.0).abs() < 1e-9);
+}
+
+/// Days on two AA cells of the busiest sensor (CC2420), whose rest takes `watts`: at a slot a second and 6 mW the scheme hardly matters, at
+/// fifty a second and 0.1 mW it decides.
+#[test]
+fn the_scheme_decides_the_life_of_nodes_that_sleep() {
+    let entries = schemes::of_scalar(&worlds::scalar(200).unwrap()).unwrap();
+    let asleep = Radio::cc2420(0.0).unwrap().sleep.value();
+    let days = |family: &str, setting: &str, period: f64, watts: f64| {
+        let same = |e: &&Entry| (e.family, e.setting.as_str()) == (family, setting) && e.feedback != "told";
+        let energy = entries.iter().find(same).unwrap().run(Stream::new(1)).unwrap().busiest;
+        assert!(energy > 0.0);
+        TWO_AA_CELLS.value() / (watts + asleep + energy / period) / 86_400.0
+    };
+    let slow = days("CFwMD", "n=0.25", 1.0, 6e-3) / days("all-send", "32 bit", 1.0, 6e-3);
+    assert!((slow - 1.0).abs() < 0.05, "{slow}");
+    let fast = |family, setting| days(family, setting, 0.02, 1e-4);
+    // Who must listen before it sends one bit dies before one that sends 32 unasked, who sends one bit unasked after it.
+    let (asked, unasked, whole) = (fast("Dymbo", "K=4"), fast("Lloyd-Max-table", "L=2"), fast("all-send", "32 bit"));
+    assert!(asked < whole && whole < unasked, "{asked} {whole} {unasked}");
 }

@@ -1,0 +1,101 @@
+//! Columns that hold their values: each measurement stands in several rows, because the table is written more often than the sensor measures.
+//!
+//! ```text
+//! of measurements with noise, written with steps s, a share of about .4 s / (deviation of a change) equals the one before by chance
+//! held    if a share of 1/4 does so, in runs of ten different values, although some change is below a fifth of the median one
+//! ```
+//! By chance that share is then at most .06. Repetitions say nothing new: taken for measurements, they make bands too narrow.
+
+use super::rows::Instant;
+use std::collections::VecDeque;
+
+/// Least share of the values that equal the one before, and number of different values that are repeated.
+const OFTEN: f64 = 0.25;
+const DIFFERENT: usize = 10;
+/// Largest of the smallest change, in medians of the changes.
+const FINE: f64 = 0.2;
+/// A longer run than so many of the longest among the first rows is no longer left out: the sensor may be stuck.
+const LONGER: usize = 3;
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Column {
+    /// Longest run that is left out; 0 if the column does not hold its values.
+    longest: usize,
+    last: Option<f64>,
+    /// Repetitions of the last value.
+    run: usize,
+}
+
+/// Leaves repetitions out of rows.
+#[derive(Debug)]
+pub(super) struct Held(Vec<Column>);
+
+/// Longest run of repetitions in values, if they are held.
+fn held(values: &[f64]) -> Option<usize> {
+    let (mut equal, mut run, mut longest) = (0_usize, 0, 0);
+    let (mut changes, mut repeated) = (Vec::new(), Vec::new());
+    for pair in values.windows(2) {
+        if pair[0] == pair[1] {
+            (equal, run) = (equal + 1, run + 1);
+            longest = longest.max(run);
+            if run == 1 {
+                repeated.push(pair[0]);
+            }
+        } else {
+            run = 0;
+            changes.push((pair[1] - pair[0]).abs());
+        }
+    }
+    changes.sort_by(f64::total_cmp);
+    repeated.sort_by(f64::total_cmp);
+    repeated.dedup();
+    let is_often = equal as f64 >= OFTEN * values.len() as f64 && repeated.len() >= DIFFERENT;
+    let is_fine = changes.first()? <= &(FINE * changes[changes.len() / 2]);
+    (is_often && is_fine).then_some(longest)
+}
+
+impl Held {
+    /// Leaves repetitions out of the first rows; `None` if no column of them holds its values.
+    pub(super) fn begin(first: &mut VecDeque<Instant>, sensors: usize) -> Option<Self> {
+        let of = |sensor: usize| {
+            let all = first.iter().flat_map(|instant| &instant.reports);
+            let own = all.filter(|(other, _)| *other == sensor);
+            let values: Vec<f64> = own
+                .filter_map(|(_, cell)| cell.filter(|cell| cell.is_finite()))
+                .collect();
+            Column {
+                longest: held(&values).map_or(0, |longest| LONGER * longest),
+                ..Column::default()
+            }
+        };
+        let mut held = Self((0..sensors).map(of).collect());
+        held.sensors().next()?;
+        first.iter_mut().for_each(|row| held.leave_out(row));
+        Some(held)
+    }
+
+    /// The sensors whose columns hold their values.
+    pub(super) fn sensors(&self) -> impl Iterator<Item = usize> + '_ {
+        let all = self.0.iter().enumerate();
+        all.filter(|(_, column)| column.longest > 0).map(|(sensor, _)| sensor)
+    }
+
+    /// Takes repetitions out of the next row, as if the sensor had not been asked.
+    pub(super) fn leave_out(&mut self, row: &mut Instant) {
+        let mut stays = Vec::with_capacity(row.reports.len());
+        for (sensor, cell) in &row.reports {
+            let Some(column) = self.0.get_mut(*sensor).filter(|column| column.longest > 0) else {
+                stays.push(true);
+                continue;
+            };
+            let is_repeated = cell.is_some() && *cell == column.last;
+            column.run = if is_repeated { column.run + 1 } else { 0 };
+            column.last = cell.or(column.last);
+            stays.push(!is_repeated || column.run > column.longest);
+        }
+        let mut of_reports = stays.iter();
+        row.reports.retain(|_| of_reports.next().is_none_or(|stays| *stays));
+        let mut of_said = stays.iter();
+        row.said.retain(|_| of_said.next().is_none_or(|stays| *stays));
+    }
+}
