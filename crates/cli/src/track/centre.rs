@@ -1,7 +1,7 @@
 //! The fusion centre for sensors that all measure the same level.
 
+use super::instant::{Instant, Said};
 use super::meaning::Seat;
-use super::rows::{Instant, Said};
 use super::sensors;
 use super::world::World;
 use crate::arguments::Model;

@@ -1,6 +1,6 @@
 //! Values of the first rows.
 
-use super::rows::Instant;
+use super::instant::Instant;
 use fewbits_filters::calibration::{self, median, wrapped};
 
 /// The deviation of an unknown slope in multiples of the slopes between values that are an eighth of the first rows apart.

@@ -3,7 +3,8 @@
 use super::applied::{Found, Sensor};
 use super::columns::Kind;
 use super::first::values_of;
-use super::rows::{Instant, Instants, Said};
+use super::instant::{Instant, Said};
+use super::rows::Instants;
 use crate::Ending;
 use crate::bounds::PerColumn;
 use crate::error::Error;

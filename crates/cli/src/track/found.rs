@@ -1,8 +1,8 @@
 //! What is found from the first rows: prior, change, noise of each sensor, steps of rounding.
 
 use super::first::{steepest, values, values_of};
+use super::instant::{Instant, Said};
 use super::meaning::Seat;
-use super::rows::{Instant, Said};
 use super::settings::Settings;
 use super::world::World;
 use crate::arguments::Model;

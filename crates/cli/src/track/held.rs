@@ -6,7 +6,7 @@
 //! ```
 //! By chance that share is then at most .06. Repetitions say nothing new: taken for measurements, they make bands too narrow.
 
-use super::rows::Instant;
+use super::instant::Instant;
 use std::collections::VecDeque;
 
 /// Least share of the values that equal the one before, and number of different values that are repeated.

@@ -1,7 +1,7 @@
 //! What the first rows of a table suggest that no option says.
 
 use super::first::{values as first_values, values_of};
-use super::rows::Instant;
+use super::instant::Instant;
 use crate::arguments::TrackOptions;
 use crate::numbers::short;
 use fewbits_filters::calibration::{median, offsets};

@@ -1,6 +1,6 @@
 //! Rows that come late: each waits until no earlier one is expected.
 
-use super::rows::Instant;
+use super::instant::Instant;
 use std::collections::VecDeque;
 
 /// Rows in the order of time.

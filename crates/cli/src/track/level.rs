@@ -2,9 +2,10 @@
 
 use super::centre::{Estimator, Step, Use, centre};
 use super::hints::Turning;
+use super::instant::Instant;
 use super::report::{BAND, cells, first_cell, first_name, summarise};
 use super::rhythm::Rhythm;
-use super::rows::{Instant, Instants};
+use super::rows::Instants;
 use super::settings::Settings;
 use super::stuck::Stuck;
 use super::summary::{EventSummary, SensorSummary, Summary, lines};

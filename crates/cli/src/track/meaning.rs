@@ -1,6 +1,6 @@
 //! A sensor's seat, and what the cells of its column mean.
 
-use super::rows::Said;
+use super::instant::Said;
 use crate::error::Error;
 use crate::numbers::above_zero;
 use crate::report::Report;

@@ -32,6 +32,7 @@ mod found;
 mod height;
 mod held;
 mod hints;
+mod instant;
 mod late;
 mod level;
 mod limits;

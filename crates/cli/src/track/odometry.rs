@@ -1,7 +1,8 @@
 //! Odometry of `ranges`: columns of what the target moved since the row before.
 
 use super::anchors::Anchor;
-use super::rows::{Instant, Instants};
+use super::instant::Instant;
+use super::rows::Instants;
 use crate::arguments::RangesOptions;
 use crate::error::Error;
 use nalgebra::Vector3;

@@ -2,10 +2,11 @@
 
 use super::anchors::read_anchors;
 use super::height::height_found;
+use super::instant::Instant;
 use super::odometry::Odometry;
 use super::path;
 use super::report::{first_cell, first_name, summarise};
-use super::rows::{Instant, Instants};
+use super::rows::Instants;
 use super::sensors;
 use crate::Ending;
 use crate::arguments::{RangesOptions, TrackOptions};

@@ -1,6 +1,6 @@
 //! When sensors of a table of single reports would have reported: silence is a row that is not there.
 
-use super::rows::Instant;
+use super::instant::Instant;
 use fewbits_filters::calibration::median;
 use std::collections::VecDeque;
 

@@ -3,6 +3,7 @@
 use super::applied::Correction;
 use super::columns::{Kind, Roles};
 use super::held::Held;
+use super::instant::{Instant, Reports, Said};
 use super::late::Late;
 use super::samples::Samples;
 use crate::arguments::TableOptions;
@@ -11,42 +12,12 @@ use crate::error::Error;
 use crate::input::Table;
 use crate::say::say;
 use fewbits_record::TimeBase;
-use fewbits_table::Side;
 use std::collections::VecDeque;
 
 /// Smallest number of seconds that is proposed for rows that come late.
 const LATE: f64 = 60.0;
 /// Times above these are not seconds since 1970 but fractions of a second: the number of them in one second.
 const PARTS_OF_A_SECOND: [(f64, f64); 3] = [(1e17, 1e9), (1e14, 1e6), (4e9, 1e3)];
-
-/// Index of each sensor, and what it reported; `None` if the cell is empty.
-type Reports = Vec<(usize, Option<f64>)>;
-
-/// What a row says of its own reports.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Said {
-    pub(super) accuracy: Option<f64>,
-    pub(super) threshold: Option<f64>,
-    /// It is a limit, as `<0.25`: the side on which the measurement is.
-    pub(super) limit: Option<Side>,
-}
-
-/// All reports of one time.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Instant {
-    /// Seconds since the first row.
-    pub(super) seconds: f64,
-    /// The time as the table writes it.
-    pub(super) time: String,
-    /// The first row of this time.
-    pub(super) row: u64,
-    /// Whether it is in the table; otherwise sensors measured then and sent nothing.
-    pub(super) is_row: bool,
-    /// Index of each sensor, and what it reported; `None` if the cell is empty.
-    pub(super) reports: Vec<(usize, Option<f64>)>,
-    /// What the rows of these reports say of them, as many.
-    pub(super) said: Vec<Said>,
-}
 
 /// A table as instants.
 pub(super) struct Instants {

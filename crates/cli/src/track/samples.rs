@@ -1,6 +1,6 @@
 //! Measurements of sensors that send on change: those that they did not send, at times without a row.
 
-use super::rows::{Instant, Said};
+use super::instant::{Instant, Said};
 use std::collections::VecDeque;
 
 /// Times nearer than this share of the interval are equal.

@@ -2,10 +2,11 @@
 
 use super::first::{values, values_of};
 use super::hints::{circle, hints};
+use super::instant::Instant;
 use super::limits::{self, limits};
 use super::meaning::{Meaning, Seat, silence};
 use super::report::Circle;
-use super::rows::{Instant, Instants};
+use super::rows::Instants;
 use super::sensors;
 use super::world::World;
 use crate::arguments::{Model, Switch, TrackOptions};

@@ -1,6 +1,6 @@
 //! Sensors that repeat one value to its last digit, though their values hardly ever did so before.
 
-use super::rows::Instant;
+use super::instant::Instant;
 
 /// Equal values in a row from which a sensor is told to be stuck, and others before it, at least.
 const LONG: usize = 30;
