@@ -67,8 +67,13 @@ impl ModelGrid {
     }
 
     /// Number of models.
-    pub(crate) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.sensors.len()
+    }
+
+    /// Never true: there is at least one model.
+    pub fn is_empty(&self) -> bool {
+        self.sensors.is_empty()
     }
 
     /// The instants at which the sensors sample, s.

@@ -30,7 +30,7 @@ pub(crate) fn exp2(x: f32) -> f32 {
     power(x.clamp(-100.0, 100.0))
 }
 
-/// [`exp2`] without clamping. Precondition: `x` in `-126..=126`.
+/// `exp2` without clamping. Precondition: `x` in `-126..=126`.
 #[inline(always)]
 pub fn power(x: f32) -> f32 {
     // The lowest bits of the sum are the integer part, in two's complement.

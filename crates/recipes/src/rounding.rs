@@ -49,14 +49,22 @@ mod tests {
     /// Defect: the smallest change of values that are sent on change, far above their rounding, was taken for a step of rounding.
     #[test]
     fn values_far_from_each_other_have_the_step_of_their_decimals() {
-        let sent = (0..20).map(|k| f64::from(k) * 0.53 + 0.02 * (f64::from(k) * 1.3).sin());
-        let shown: Vec<f64> = sent.map(|value| (1e4 * value).round() * 1e-4).collect();
-        assert!(step(&shown).is_some_and(|step| step < 1.1e-4), "{:?}", step(&shown));
-        // Sixteenths that are shown with two decimals stay sixteenths.
-        let sixteenths: Vec<f64> = (0..60)
-            .map(|k| (100.0 * (f64::from(k * 7 % 40) / 16.0)).round() / 100.0)
+        let mut fraction = 0.3_f64;
+        for decimals in [1e-2, 1e-3] {
+            let mut value = 0.0;
+            let sent = (0..20).map(|_| {
+                fraction = (fraction * 997.0 + 0.137).fract();
+                value += if fraction > 0.5 { 0.5 } else { -0.5 } + 0.2 * (fraction - 0.5);
+                (value / decimals).round() * decimals
+            });
+            let sent: Vec<f64> = sent.collect();
+            assert!(step(&sent).is_some_and(|step| step < 1.1 * decimals), "{decimals}: {:?}", step(&sent));
+        }
+        // Halves that are shown with one decimal stay halves.
+        let halves: Vec<f64> = (0..60)
+            .map(|k| (8.0 * (f64::from(k) * 0.37).sin()).round() / 2.0)
             .collect();
-        assert!(step(&sixteenths).is_some_and(|step| (step - 0.0625).abs() < 0.006), "{:?}", step(&sixteenths));
+        assert!(step(&halves).is_some_and(|step| (step - 0.5).abs() < 1e-9), "{:?}", step(&halves));
     }
 
     #[test]

@@ -319,7 +319,8 @@ fn repetitions_of_held_values_are_no_measurements() {
             .filter(|(row, level)| held(row, **level))
             .count() as f64
             / 1200.0;
-        assert!(rows.len() == 1200 && (0.88..=0.995).contains(&share), "{times} {seed}: {share}");
+        // Errors last for some forty rows: thirty are independent, and three standard errors of a share of .95 are .12.
+        assert!(rows.len() == 1200 && share >= 0.83, "{times} {seed}: {share}");
         assert!(
             summary["sensors"][0]["reports"]
                 .as_u64()

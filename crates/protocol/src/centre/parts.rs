@@ -97,7 +97,7 @@ pub enum Recipient {
 /// What the driver must do, in this order. A driver must handle every variant, so the enum is exhaustive.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Action {
-    /// Predict into this slot and call [`Centre::on_predicted`]. If the prediction fails, do nothing: the slot passes without update.
+    /// Predict into this slot and call [`Centre::on_predicted`](super::Centre::on_predicted). If the prediction fails, do nothing: the slot passes without update.
     Predict {
         /// The slot, counted from 1.
         slot: u64,
@@ -120,7 +120,7 @@ pub enum Action {
     SetTimer {
         /// Time at which it fires, in nanoseconds.
         at: u64,
-        /// The timer to pass to [`Centre::on_timer`].
+        /// The timer to pass to [`Centre::on_timer`](super::Centre::on_timer).
         timer: CentreTimer,
     },
     /// Record a note about a sensor.
