@@ -170,15 +170,15 @@ def test_trackers():
     assert path[0].equals(path[1], null_equal=True)
 
 
-def work(model, seed):
-    return fb.OneBit(a=0.9, process=0.5, noise=1.0).run(model.simulate(np.arange(20.0), start=0.0, seed=seed)[:, 0], mean=0.0, variance=2.0)
-
-
 def test_work_in_other_processes():
-    model = fb.Model.walk(0.1)
+    model, times = fb.Model.walk(0.1), np.arange(20.0)
+    filtered = fb.OneBit(a=0.9, process=0.5, noise=1.0)
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        for seed, run in zip((1, 2), pool.map(work, [model] * 2, (1, 2)), strict=True):
-            assert np.array_equal(run.mean, work(model, seed).mean)
+        for seed in (1, 2):
+            path = pool.submit(model.simulate, times, start=0.0, seed=seed).result()
+            assert np.array_equal(path, model.simulate(times, start=0.0, seed=seed))
+            run = pool.submit(filtered.run, path[:, 0], mean=0.0, variance=2.0).result()
+            assert np.array_equal(run.mean, filtered.run(path[:, 0], mean=0.0, variance=2.0).mean)
 
 
 @pytest.mark.parametrize("made", [fb.Model.walk(0.1), fb.Generator(1), fb.design(prior=(0.0, 1.0), noise=[1.0], bits=[1])])

@@ -538,7 +538,7 @@ fn reports_of_another_kind_are_named_at_both_ends() {
     ];
     let place = free_place();
     let mut centre = format!(
-        "listen = \"{place}\"\nperiod = 0.04\nmodel = {{ kind = \"random-walk\", density = 0.01 }}\n\
+        "listen = \"{place}\"\nperiod = 0.25\nmodel = {{ kind = \"random-walk\", density = 0.01 }}\n\
          prior = {{ mean = [0.0], deviation = [10.0] }}\n"
     );
     for (number, (here, there, deviation, _)) in (1..).zip(pairs) {
@@ -577,15 +577,17 @@ fn reports_of_another_kind_are_named_at_both_ends() {
                     || has(at_centre, &sends) && has(at_centre, &own_here) && has(&said.lock().unwrap(), &own)
             })
     };
-    // In a row of the slot only these two have reports.
+    // Only these two have reports that are used.
     let used = |row: &String| -> Vec<u64> {
         let row: serde_json::Value = serde_json::from_str(row).unwrap();
         let sensors = row["sensors"].as_array().unwrap().iter();
         let used = sensors.filter(|sensor| sensor["observed"].is_object());
         used.map(|sensor| sensor["number"].as_u64().unwrap()).collect()
     };
-    let (rows, at_centre, _) =
-        stopped_after(centre, |rows, at_centre| is_named(at_centre) && rows.iter().any(|row| used(row) == [11, 12]));
+    let (rows, at_centre, _) = stopped_after(centre, |rows, at_centre| {
+        let is_used = |number| rows.iter().any(|row| used(row).contains(&number));
+        is_named(at_centre) && is_used(11) && is_used(12)
+    });
     for (mut process, _, reader) in sensors {
         process.kill().unwrap();
         process.wait().unwrap();
