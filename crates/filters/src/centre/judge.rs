@@ -1,6 +1,6 @@
 //! Updates of presence, health and process noise after the observations of one instant.
 
-use super::gate::Fate;
+use super::gate::{Fate, JUMPED};
 use super::health::{self, Alarm, CLIP, Health, Residual, SEQUENCES};
 use super::repeats::Repeated;
 use super::{Event, FusionCentre};
@@ -32,6 +32,8 @@ pub(super) struct Watched {
     pub apart: Option<Residual>,
     /// The value that it is, and the variance of its noise.
     pub value: Option<(f64, f64)>,
+    /// What the other reports say of it, if it was rejected ([`FusionCentre::votes`]).
+    pub votes: f64,
     pub shown: Shown,
 }
 
@@ -56,6 +58,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             fate,
             apart,
             value,
+            votes,
             shown,
         } in watched
         {
@@ -80,10 +83,11 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             if *fate == Fate::Rejected {
                 state.rejected += 1;
                 state.astray = state.astray.saturating_add(1);
+                state.votes = (state.votes + votes).clamp(-JUMPED, JUMPED);
                 events.push(Event::Rejected(number));
                 is_any_rejected = true;
             } else if *fate != Fate::Excluded {
-                state.astray = 0;
+                (state.astray, state.votes) = (0, 0.0);
                 is_any_used = true;
             }
             if self.health == Health::Off {
@@ -231,7 +235,8 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     fn exclude(&mut self, seat: usize, events: &mut Vec<Event>) {
         let own = self.members[seat].state;
         let excluded = self.members.iter().filter(|member| member.state.is_out()).count();
-        if own.is_out() || self.health == Health::Off {
+        // If the others speak for it rather than for the prediction, it is not the one that is wrong.
+        if own.is_out() || own.votes > 0.0 || self.health == Health::Off {
             return;
         }
         let suspicion = |state: &super::state::MemberState| state.monitor.contradiction(&self.limits.sensor);

@@ -34,8 +34,12 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         let mut verdicts = self.gate(&law, &predicted, &readings);
         let mut belief = self.belief.clone();
         let mut reopened = false;
+        let votes = match self.health {
+            Health::Exclude => self.votes(&predicted, &readings, &verdicts),
+            _ => vec![0.0; readings.len()],
+        };
         if self.health == Health::Exclude
-            && let Some((wide, again)) = self.reopened(&predicted, &readings, &verdicts)
+            && let Some((wide, again)) = self.reopened(&predicted, &readings, &verdicts, &votes)
         {
             let start = self.acquisition.unwrap_or(wide);
             belief = self.filter.restart(rng, &start, &self.belief)?;
@@ -93,13 +97,15 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             .iter()
             .zip(&verdicts)
             .zip(in_order.shown)
-            .map(|((reading, verdict), shown)| Watched {
+            .zip(votes)
+            .map(|(((reading, verdict), shown), votes)| Watched {
                 seat: reading.seat,
                 fate: verdict.fate,
                 apart: verdict.tested.residual,
                 value: (reading.content == Content::Report && self.health != Health::Off)
                     .then(|| self.members[reading.seat].sensor.value(reading.slot))
                     .flatten(),
+                votes,
                 shown,
             })
             .collect();

@@ -37,6 +37,9 @@ pub(super) struct MemberState {
     /// Number of reports that were rejected, in all and since the last that was not.
     pub rejected: u64,
     pub astray: u32,
+    /// What the other reports said of those since then, in nats: above 0, that they are right and the prediction is not.
+    #[serde(default)]
+    pub votes: f64,
     /// Number of copies of reports that were dropped.
     pub copies: u64,
     pub repeats: Repeats,
@@ -55,6 +58,7 @@ impl MemberState {
             depth: 0.0,
             rejected: 0,
             astray: 0,
+            votes: 0.0,
             copies: 0,
             repeats: Repeats::new(),
         }
@@ -69,7 +73,7 @@ impl MemberState {
     pub(crate) fn forget_tests(&mut self) {
         self.monitor = Monitor::default();
         (self.last_residual, self.last_in_order) = (None, None);
-        (self.disputed, self.depth, self.astray) = (false, 0.0, 0);
+        (self.disputed, self.depth, self.astray, self.votes) = (false, 0.0, 0, 0.0);
     }
 }
 
