@@ -22,7 +22,8 @@ use nalgebra::SMatrix;
 
 /// Assumed share of wild values.
 const WILD: f64 = 0.002;
-/// Instants in a row without a value that agrees with the prediction after which the level is taken to have jumped.
+/// Instants in a row without a value that agrees with the prediction after which the level is taken to have jumped; also so many wild values of one
+/// sensor in a row, if the others are likelier where it says that the level is.
 const JUMP: u32 = 4;
 /// Steps of the search, in `ln`, and its reach about the start.
 const STEPS: [f64; 6] = [2.0, 1.0, 0.5, 0.25, 0.1, 0.03];
@@ -222,6 +223,7 @@ where
     fn log_likelihood(&self, instants: &[Instant], range: f64, change: f64, noises: &[f64]) -> Option<f64> {
         let world = (self.world)(change).ok()?;
         let (mut belief, mut total, mut astray) = (*self.prior, 0.0, 0);
+        let mut alone = vec![(0, 0.0); noises.len()];
         let mut now = instants.first()?.seconds;
         // Most steps are as long as the one before.
         let mut step: Option<(f64, Box<dyn GaussianDynamics<D> + '_>)> = None;
@@ -236,7 +238,8 @@ where
                     belief = assumed_density::predict(&**step, &belief);
                 }
             }
-            let (mut agreeing, mut farthest) = (0.0, 0.0_f64);
+            let (mut agreeing, mut farthest, mut has_jumped) = (0.0, 0.0_f64, false);
+            let predicted = belief.mean()[0];
             for (sensor, reading) in &instant.values {
                 let (mean, covariance) = (*belief.mean(), *belief.covariance());
                 let said = reading.said(mean[0], covariance[(0, 0)], noises[*sensor], self.period)?;
@@ -246,6 +249,14 @@ where
                 // The moments of the mixture of "it is wild" and "it is not".
                 let weight = right / (right + wild);
                 agreeing += weight;
+                let (in_row, votes) = &mut alone[*sensor];
+                if weight > 0.5 {
+                    (*in_row, *votes) = (0, 0.0);
+                } else if let Some(level) = reading.middle() {
+                    *in_row += 1;
+                    *votes += self.votes(*sensor, level, predicted, noises, &instant.values);
+                    has_jumped |= *in_row >= JUMP && *votes > 0.0;
+                }
                 farthest = farthest.max((said.score * deviation).abs());
                 let gain = covariance.column(0) / deviation;
                 let off = said.score * said.score;
@@ -258,14 +269,29 @@ where
             } else {
                 astray + 1
             };
-            if astray >= JUMP {
+            if astray >= JUMP || has_jumped {
                 let mut covariance = *belief.covariance();
                 covariance[(0, 0)] += farthest * farthest;
                 belief = Gaussian::from_trusted_parts(*belief.mean(), covariance);
                 astray = 0;
+                alone.fill((0, 0.0));
             }
         }
         (!total.is_nan()).then_some(total)
+    }
+
+    /// What the other readings of an instant say of one that is wild: how much likelier they are if the level is where it is than where it was
+    /// predicted, in nats. Those of sensors that are much less accurate than the prediction agree with it wherever the level is.
+    fn votes(&self, own: usize, level: f64, predicted: f64, noises: &[f64], readings: &[(usize, Reading)]) -> f64 {
+        let log = |sensor: usize, reading: &Reading, level: f64| {
+            let said = reading.said(level, 0.0, noises[sensor], self.period);
+            said.map_or(f64::MIN_POSITIVE, |said| said.density.max(f64::MIN_POSITIVE))
+                .ln()
+        };
+        let others = readings.iter().filter(|(sensor, _)| *sensor != own);
+        others
+            .map(|(sensor, reading)| log(*sensor, reading, level) - log(*sensor, reading, predicted))
+            .sum()
     }
 }
 

@@ -3,7 +3,7 @@
 use super::FusionCentre;
 use super::health::Health;
 use super::law::Law;
-use super::reading::{Content, Reading, Tested, conditioned};
+use super::reading::{Content, Reading, Tested};
 use crate::contract::StateFilter;
 use fewbits_core::Gaussian;
 
@@ -11,10 +11,6 @@ use fewbits_core::Gaussian;
 const DECISIVE: f64 = 9.2;
 /// The same of the only two sensors that report: only the prediction can decide, and it holds the earlier reports of both.
 const DECISIVE_OF_TWO: f64 = 50.0;
-
-/// Odds, in nats, at which the other reports say that a rejected one is right and the prediction is not: one in 100 against it. What one
-/// report adds is at most twice that.
-pub(super) const JUMPED: f64 = 4.6;
 
 /// Smallest `ln p` of a wrong report.
 const LOWEST: f64 = -1e4;
@@ -168,49 +164,25 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         member.state.repeats.agrees(value, spread + noise)
     }
 
-    /// What the other reports say of each rejected one, in nats; 0 of those that are not rejected.
-    ///
-    /// ```text
-    /// sum_j  ln p(report j | the rejected one is right, whatever was predicted) - ln p(report j | predicted)
-    /// ```
-    /// Each is measured from the likeliest report. A sensor that is much less accurate than the prediction says little, whatever it reports.
-    pub(super) fn votes(&self, predicted: &Gaussian<D>, readings: &[Reading<'_, D>], verdicts: &[Verdict]) -> Vec<f64> {
-        let is_judged = |i: &usize| {
-            let (reading, fate) = (&readings[*i], verdicts[*i].fate);
-            reading.content == Content::Report && reading.likelihood.is_some() && fate != Fate::Excluded
-        };
-        let test = |i: usize, given: &Gaussian<D>| self.members[readings[i].seat].test(&readings[i], given);
-        let of = |i: usize| {
-            if !is_judged(&i) || verdicts[i].fate != Fate::Rejected {
-                return 0.0;
-            }
-            let wide = widened(predicted).find(|wide| test(i, wide).tail() > FITS);
-            let Some(right) = wide.map(|wide| conditioned(&wide, &[&readings[i]])) else {
-                return 0.0;
-            };
-            let others = (0..readings.len()).filter(|j| *j != i && is_judged(j));
-            let vote = |j: usize| test(j, predicted).depth() - test(j, &right).depth();
-            others
-                .map(vote)
-                .filter(|vote| !vote.is_nan())
-                .map(|vote| vote.clamp(-2.0 * JUMPED, 2.0 * JUMPED))
-                .sum()
-        };
-        (0..readings.len()).map(of).collect()
-    }
-
-    /// Whether most reports are rejected, and most sensors that report at all disagree with the prediction, in this instant or in their last
-    /// report.
-    fn is_majority_astray(
+    /// A prediction wide enough that most of the reports that were rejected agree with it and with each other; `None` if there is none, or
+    /// if it is too early to say.
+    pub(super) fn reopened(
         &self,
+        predicted: &Gaussian<D>,
         readings: &[Reading<'_, D>],
         verdicts: &[Verdict],
-        judged: usize,
-        rejected: usize,
-    ) -> bool {
-        if judged == 0 || 2 * rejected <= judged {
-            return false;
+    ) -> Option<(Gaussian<D>, Vec<Verdict>)> {
+        let reports = |wanted: fn(Fate) -> bool, verdicts: &[Verdict]| {
+            let those = readings.iter().zip(verdicts).filter(|(reading, verdict)| {
+                reading.content == Content::Report && reading.likelihood.is_some() && wanted(verdict.fate)
+            });
+            those.count()
+        };
+        let judged = reports(|fate| fate != Fate::Excluded, verdicts);
+        if judged == 0 || 2 * reports(|fate| fate == Fate::Rejected, verdicts) <= judged {
+            return None;
         }
+        // Most sensors that report at all must disagree with the prediction, in this instant or in their last report.
         let now = |seat: usize| {
             let here = readings.iter().zip(verdicts).find(|(reading, _)| reading.seat == seat);
             here.map(|(_, verdict)| verdict.fate == Fate::Rejected)
@@ -221,32 +193,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             let is_astray = now(seat).unwrap_or(member.state.astray > 0);
             (all + 1, astray + usize::from(is_astray))
         });
-        2 * astray > all
-    }
-
-    /// A prediction wide enough that most of the reports that were rejected agree with it and with each other, or one that the others say is
-    /// right with all the rest; `None` if there is none, or if it is too early to say.
-    pub(super) fn reopened(
-        &self,
-        predicted: &Gaussian<D>,
-        readings: &[Reading<'_, D>],
-        verdicts: &[Verdict],
-        votes: &[f64],
-    ) -> Option<(Gaussian<D>, Vec<Verdict>)> {
-        let reports = |wanted: fn(Fate) -> bool, verdicts: &[Verdict]| {
-            let those = readings.iter().zip(verdicts).filter(|(reading, verdict)| {
-                reading.content == Content::Report && reading.likelihood.is_some() && wanted(verdict.fate)
-            });
-            those.count()
-        };
-        let judged = reports(|fate| fate != Fate::Excluded, verdicts);
-        let has_jumped = readings
-            .iter()
-            .zip(votes)
-            .any(|(reading, votes)| *votes != 0.0 && self.members[reading.seat].state.votes + votes >= JUMPED);
-        if !has_jumped
-            && !self.is_majority_astray(readings, verdicts, judged, reports(|fate| fate == Fate::Rejected, verdicts))
-        {
+        if 2 * astray <= all {
             return None;
         }
         for wide in widened(predicted) {
@@ -262,7 +209,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                     true => INSTANTS_ASTRAY,
                     false => 2 * INSTANTS_ASTRAY,
                 };
-                return (has_jumped || agree > 1 || self.astray + 1 >= needed).then_some((wide, again));
+                return (agree > 1 || self.astray + 1 >= needed).then_some((wide, again));
             }
         }
         None
@@ -270,7 +217,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
 }
 
 /// The prediction with larger and larger covariances.
-fn widened<const D: usize>(predicted: &Gaussian<D>) -> impl Iterator<Item = Gaussian<D>> {
+pub(super) fn widened<const D: usize>(predicted: &Gaussian<D>) -> impl Iterator<Item = Gaussian<D>> {
     let wider = |last: &Gaussian<D>| Gaussian::from_trusted_parts(*last.mean(), last.covariance() * WIDER);
     let all = std::iter::successors(Some(wider(predicted)), move |last| Some(wider(last)));
     all.take(WIDENINGS).take_while(|wide| wide.is_finite())
@@ -280,6 +227,6 @@ fn widened<const D: usize>(predicted: &Gaussian<D>) -> impl Iterator<Item = Gaus
 const WIDER: f64 = 16.0;
 const WIDENINGS: usize = 60;
 /// A report agrees with the wide prediction if at least this share of reports is as unlikely.
-const FITS: f64 = 0.05;
+pub(super) const FITS: f64 = 0.05;
 /// So many instants in a row must contradict the prediction before a single sensor is believed against it.
 pub(super) const INSTANTS_ASTRAY: u32 = 4;

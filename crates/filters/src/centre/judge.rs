@@ -1,6 +1,6 @@
 //! Updates of presence, health and process noise after the observations of one instant.
 
-use super::gate::{Fate, JUMPED};
+use super::gate::Fate;
 use super::health::{self, Alarm, CLIP, Health, Residual, SEQUENCES};
 use super::repeats::Repeated;
 use super::{Event, FusionCentre};
@@ -32,8 +32,6 @@ pub(super) struct Watched {
     pub apart: Option<Residual>,
     /// The value that it is, and the variance of its noise.
     pub value: Option<(f64, f64)>,
-    /// What the other reports say of it, if it was rejected ([`FusionCentre::votes`]).
-    pub votes: f64,
     pub shown: Shown,
 }
 
@@ -58,7 +56,6 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             fate,
             apart,
             value,
-            votes,
             shown,
         } in watched
         {
@@ -83,11 +80,10 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             if *fate == Fate::Rejected {
                 state.rejected += 1;
                 state.astray = state.astray.saturating_add(1);
-                state.votes = (state.votes + votes).clamp(-JUMPED, JUMPED);
                 events.push(Event::Rejected(number));
                 is_any_rejected = true;
             } else if *fate != Fate::Excluded {
-                (state.astray, state.votes) = (0, 0.0);
+                state.astray = 0;
                 is_any_used = true;
             }
             if self.health == Health::Off {
@@ -146,7 +142,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 state.disputed = false;
             }
             if is_alarm {
-                alarmed.push(*seat);
+                alarmed.push((*seat, *fate));
             }
             // The centre's own test leaves out residuals: in a lost track those of different sensors have different signs.
             // Surprises and products do not.
@@ -168,8 +164,8 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         for seat in repeating {
             self.hold(seat, &mut events);
         }
-        for seat in alarmed {
-            self.exclude(seat, &mut events);
+        for (seat, fate) in alarmed {
+            self.exclude(seat, fate, &mut events);
         }
         // 3. A common failure: the evidence of all sensors together.
         let sensors = self.members.iter_mut().map(|member| &mut member.state.presence);
@@ -193,6 +189,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             if let Some(prior) = self.acquisition {
                 self.belief = self.filter.restart(rng, &prior, &self.belief)?;
                 self.history.clear();
+                self.rival = None;
                 self.members.iter_mut().for_each(|member| member.state.forget_tests());
                 events.push(Event::Reacquired);
             }
@@ -232,11 +229,14 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
 
     /// Decides about a sensor whose test raised an alarm. It is excluded if it alone is suspect, or by far the most. If another is about as
     /// suspect, both are in dispute: their reports contradict each other, and nothing says which is wrong.
-    fn exclude(&mut self, seat: usize, events: &mut Vec<Event>) {
+    fn exclude(&mut self, seat: usize, fate: Fate, events: &mut Vec<Event>) {
         let own = self.members[seat].state;
         let excluded = self.members.iter().filter(|member| member.state.is_out()).count();
-        // If the others speak for it rather than for the prediction, it is not the one that is wrong.
-        if own.is_out() || own.votes > 0.0 || self.health == Health::Off {
+        // The prediction may be what is wrong, until the others have spoken. They speak from the first rejected report on, or from the next
+        // report on. There is no rival to a report that is impossible.
+        let is_against = self.rival.and_then(|rival| rival.is_against(self.members[seat].number));
+        let is_early = self.health == Health::Exclude && !is_against.unwrap_or(fate == Fate::Rejected);
+        if own.is_out() || is_early || self.health == Health::Off {
             return;
         }
         let suspicion = |state: &super::state::MemberState| state.monitor.contradiction(&self.limits.sensor);

@@ -37,6 +37,7 @@ mod reading;
 mod receive;
 mod remote;
 mod repeats;
+mod rival;
 mod slot;
 mod state;
 mod together;
@@ -93,6 +94,7 @@ pub struct FusionCentre<const D: usize, F: StateFilter<D>> {
     dropped: u64,
     /// Number of instants in a row of which no report was used.
     astray: u32,
+    rival: Option<rival::Rival<D>>,
     health: Health,
     failures: Failures,
     limits: health::Limits,
@@ -125,6 +127,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             history: Vec::new(),
             dropped: 0,
             astray: 0,
+            rival: None,
             health: Health::default(),
             failures: Failures::default(),
             limits: health::Limits::new(&FalseAlarms::default()),
@@ -324,8 +327,12 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         if seconds > 0.0 {
             // On a copy, so that a failure leaves the centre as it was.
             let mut belief = self.belief.clone();
+            let rival = match self.rival {
+                Some(rival) => rival.moved(&*self.world.over(seconds)?, self.noise_scale),
+                None => None,
+            };
             self.moved(rng, &mut belief, seconds)?;
-            self.belief = belief;
+            (self.belief, self.rival) = (belief, rival);
             let sensors = self.members.iter_mut().map(|member| &mut member.state.presence);
             self.outage.advance(seconds, &self.failures, sensors);
             self.now = time;

@@ -34,20 +34,23 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         let mut verdicts = self.gate(&law, &predicted, &readings);
         let mut belief = self.belief.clone();
         let mut reopened = false;
-        let votes = match self.health {
-            Health::Exclude => self.votes(&predicted, &readings, &verdicts),
-            _ => vec![0.0; readings.len()],
-        };
-        if self.health == Health::Exclude
-            && let Some((wide, again)) = self.reopened(&predicted, &readings, &verdicts, &votes)
-        {
-            let start = self.acquisition.unwrap_or(wide);
-            belief = self.filter.restart(rng, &start, &self.belief)?;
-            (predicted, verdicts, reopened) = (wide, again, true);
-            law = self.law(&belief, &predicted);
-            if self.acquisition.is_some() {
-                predicted = start;
-                verdicts = self.gate(&law, &predicted, &readings);
+        let mut rival = None;
+        if self.health == Health::Exclude {
+            let found = self.rival(&predicted, &readings, &verdicts);
+            let jumped = found.filter(|(rival, _)| rival.is_believed()).map(|(_, wide)| {
+                let again = self.gate(&Law::Moments(wide), &wide, &readings);
+                (wide, again)
+            });
+            rival = found.map(|(rival, _)| rival);
+            if let Some((wide, again)) = self.reopened(&predicted, &readings, &verdicts).or(jumped) {
+                let start = self.acquisition.unwrap_or(wide);
+                belief = self.filter.restart(rng, &start, &self.belief)?;
+                (predicted, verdicts, reopened, rival) = (wide, again, true, None);
+                law = self.law(&belief, &predicted);
+                if self.acquisition.is_some() {
+                    predicted = start;
+                    verdicts = self.gate(&law, &predicted, &readings);
+                }
             }
         }
         let before = (self.window > 0.0).then(|| belief.clone());
@@ -63,12 +66,13 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             info.log_likelihood = f64::NEG_INFINITY;
         }
         // From here on the centre changes. Only the restart of a lost track can fail; then everything is put back.
-        let earlier: (Vec<MemberState>, _, _, _, _) = (
+        let earlier: (Vec<MemberState>, _, _, _, _, _) = (
             self.members.iter().map(|member| member.state).collect(),
             self.outage,
             self.monitor,
             self.noise_scale,
             self.astray,
+            std::mem::replace(&mut self.rival, rival),
         );
         let earlier_history = self.acquisition.map(|_| self.history.clone());
         let earlier_belief = std::mem::replace(&mut self.belief, belief);
@@ -97,15 +101,13 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             .iter()
             .zip(&verdicts)
             .zip(in_order.shown)
-            .zip(votes)
-            .map(|(((reading, verdict), shown), votes)| Watched {
+            .map(|((reading, verdict), shown)| Watched {
                 seat: reading.seat,
                 fate: verdict.fate,
                 apart: verdict.tested.residual,
                 value: (reading.content == Content::Report && self.health != Health::Off)
                     .then(|| self.members[reading.seat].sensor.value(reading.slot))
                     .flatten(),
-                votes,
                 shown,
             })
             .collect();
@@ -115,12 +117,13 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 Ok(Received { info, events })
             }
             Err(error) => {
-                let (states, outage, monitor, noise_scale, astray) = earlier;
+                let (states, outage, monitor, noise_scale, astray, rival) = earlier;
                 self.members
                     .iter_mut()
                     .zip(states)
                     .for_each(|(member, state)| member.state = state);
                 (self.outage, self.monitor, self.noise_scale, self.astray) = (outage, monitor, noise_scale, astray);
+                self.rival = rival;
                 self.belief = earlier_belief;
                 self.history = earlier_history.unwrap_or_default();
                 Err(error)

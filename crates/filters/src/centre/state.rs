@@ -3,6 +3,7 @@
 use super::health::Monitor;
 use super::presence::{Outage, Presence};
 use super::repeats::Repeats;
+use super::rival::StoredRival;
 use super::{FusionCentre, Slot};
 use crate::Error;
 use crate::contract::StateFilter;
@@ -37,9 +38,6 @@ pub(super) struct MemberState {
     /// Number of reports that were rejected, in all and since the last that was not.
     pub rejected: u64,
     pub astray: u32,
-    /// What the other reports said of those since then, in nats: above 0, that they are right and the prediction is not.
-    #[serde(default)]
-    pub votes: f64,
     /// Number of copies of reports that were dropped.
     pub copies: u64,
     pub repeats: Repeats,
@@ -58,7 +56,6 @@ impl MemberState {
             depth: 0.0,
             rejected: 0,
             astray: 0,
-            votes: 0.0,
             copies: 0,
             repeats: Repeats::new(),
         }
@@ -73,7 +70,7 @@ impl MemberState {
     pub(crate) fn forget_tests(&mut self) {
         self.monitor = Monitor::default();
         (self.last_residual, self.last_in_order) = (None, None);
-        (self.disputed, self.depth, self.astray, self.votes) = (false, 0.0, 0, 0.0);
+        (self.disputed, self.depth, self.astray) = (false, 0.0, 0);
     }
 }
 
@@ -146,6 +143,8 @@ pub struct CentreState<B> {
     history: Vec<Checkpoint<B>>,
     dropped: u64,
     astray: u32,
+    #[serde(default)]
+    rival: Option<StoredRival>,
 }
 
 impl<B: Serialize> CentreState<B> {
@@ -200,6 +199,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             history: self.history.clone(),
             dropped: self.dropped,
             astray: self.astray,
+            rival: self.rival.as_ref().map(StoredRival::from),
         }
     }
 
@@ -218,6 +218,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             let expected = format!("the sensors {:?}", self.sensors().collect::<Vec<_>>());
             return refuse("state", format!("of the sensors {:?}", state.members.keys().collect::<Vec<_>>()), expected);
         }
+        let rival = state.rival.as_ref().map(StoredRival::read).transpose()?;
         for (member, stored) in self.members.iter_mut().zip(state.members.into_values()) {
             member.state = stored;
         }
@@ -229,6 +230,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         self.history = state.history;
         self.dropped = state.dropped;
         self.astray = state.astray;
+        self.rival = rival;
         Ok(())
     }
 }
