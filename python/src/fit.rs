@@ -7,6 +7,7 @@ use crate::instants::{self, Long};
 use crate::model::Model;
 use crate::parts::{Parts, Tests};
 use crate::seat::{Missing, Reads, Seat, Sends};
+use crate::stored::{self, Reduced};
 use crate::table::{Given, Table, doubles};
 use arrow_array::{ArrayRef, BooleanArray, Int64Array, StringArray};
 use fewbits_filters::calibration::{Instant, Reading};
@@ -14,12 +15,15 @@ use fewbits_filters::fit::{self as library, Quantity, Request};
 use fewbits_models::ContinuousLinear;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex};
 
 /// What `fit` found.
 #[pyclass(frozen, module = "fewbits")]
+#[derive(Serialize, Deserialize)]
 pub(crate) struct Fit {
     found: library::Fit,
     names: Vec<String>,
@@ -174,6 +178,19 @@ fn readings(row: &instants::Instant, bits: &[bool], names: &[String]) -> Outcome
 
 #[pymethods]
 impl Fit {
+    #[staticmethod]
+    fn _restored(state: &Bound<'_, PyAny>) -> Outcome<Self> {
+        let state: Self = stored::state(state)?;
+        if !state.is_valid() {
+            return refused("state", format!("{} sensors", state.names.len()), "that of a fit");
+        }
+        Ok(state)
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Outcome<Reduced<'py, (Bound<'py, PyBytes>,)>> {
+        Ok((stored::maker::<Self>(py)?, (stored::bytes(py, self)?,)))
+    }
+
     /// Every parameter that was found: quantity, sensor (empty of the level), value and standard error. Of a sensor of bits the threshold is
     /// found instead of an offset.
     #[getter]
@@ -322,27 +339,49 @@ impl Fit {
 }
 
 impl Fit {
+    /// Whether every number of a sensor is that of one.
+    fn is_valid(&self) -> bool {
+        let (found, count) = (&self.found, self.names.len());
+        let of_sensor = |quantity: Quantity| parts(quantity).1.is_none_or(|sensor| sensor < count);
+        [self.bits.len(), found.model.sensors.len()] == [count; 2]
+            && found.relative_to < count
+            && found.estimates.iter().all(|one| of_sensor(one.quantity))
+            && found.refused.iter().all(|one| of_sensor(one.quantity))
+            && found.tests.iter().all(|test| test.sensor < count)
+            && found
+                .correlations
+                .iter()
+                .all(|one| one.sensors.0.max(one.sensors.1) < count)
+    }
+
     fn is_threshold(&self, quantity: Quantity) -> bool {
         matches!(quantity, Quantity::Bias(sensor) if self.bits[sensor])
     }
 
     fn titles(&self, quantities: impl Iterator<Item = Quantity>) -> (ArrayRef, ArrayRef) {
-        let of = |quantity: Quantity| match quantity {
-            Quantity::Change => ("change", None),
-            Quantity::TimeConstant => ("time_constant", None),
-            Quantity::Mean => ("mean", None),
-            Quantity::Noise(sensor) => ("noise", Some(sensor)),
-            Quantity::Bias(sensor) if self.bits[sensor] => ("threshold", Some(sensor)),
-            Quantity::Bias(sensor) => ("offset", Some(sensor)),
-            Quantity::Gain(sensor) => ("gain", Some(sensor)),
-            Quantity::Slope(sensor) => ("slope", Some(sensor)),
-            Quantity::Walk(sensor) => ("walk", Some(sensor)),
-            Quantity::Delay(sensor) => ("delay", Some(sensor)),
-            _ => ("other", None),
+        let of = |quantity: Quantity| match parts(quantity) {
+            (_, sensor) if self.is_threshold(quantity) => ("threshold", sensor),
+            parts => parts,
         };
         let name = |sensor: Option<usize>| sensor.map_or(String::new(), |sensor| self.names[sensor].clone());
         let (words, sensors): (Vec<_>, Vec<_>) = quantities.map(of).unzip();
         (texts(words.into_iter().map(str::to_owned)), texts(sensors.into_iter().map(name)))
+    }
+}
+
+/// Its name, and the sensor it is of.
+fn parts(quantity: Quantity) -> (&'static str, Option<usize>) {
+    match quantity {
+        Quantity::Change => ("change", None),
+        Quantity::TimeConstant => ("time_constant", None),
+        Quantity::Mean => ("mean", None),
+        Quantity::Noise(sensor) => ("noise", Some(sensor)),
+        Quantity::Bias(sensor) => ("offset", Some(sensor)),
+        Quantity::Gain(sensor) => ("gain", Some(sensor)),
+        Quantity::Slope(sensor) => ("slope", Some(sensor)),
+        Quantity::Walk(sensor) => ("walk", Some(sensor)),
+        Quantity::Delay(sensor) => ("delay", Some(sensor)),
+        _ => ("other", None),
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::array::{matrix, shown, vector};
 use crate::error::{Outcome, refused};
 use crate::given::named;
-use crate::stored::{Reduced, maker};
+use crate::stored::{self, Reduced, maker};
 use crate::table::{Table, doubles};
 use arrow_array::{ArrayRef, Int64Array};
 use fewbits_diffusion::{Flow, Plan, PotentialFlow, Scheme, SensorField, StepControl, Transport};
@@ -13,6 +13,8 @@ use fewbits_topology::{Deployment, Graph};
 use nalgebra::{Vector2, Vector3};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Largest number of cells of a plan, times its nodes and instants.
@@ -60,12 +62,29 @@ const MOST_NUMBERS: usize = 1 << 27;
 /// True
 #[pyclass(frozen, module = "fewbits")]
 pub(crate) struct SourceSearch {
+    given: Setting,
     field: SearchField,
     sensor: SourceSensor,
-    rate: RateModel,
     search: SearchBox,
+}
+
+/// What a search is made of.
+#[derive(Clone, Serialize, Deserialize)]
+struct Setting {
+    places: Vec<Vector2<f64>>,
+    reach: f64,
+    instants: Vec<f64>,
+    noise: f64,
+    diffusivity: f64,
+    wind: (f64, f64),
+    rate: RateModel,
+    corners: ((f64, f64), (f64, f64)),
     threshold: f64,
-    most: usize,
+    max_nodes: usize,
+    plan: Option<String>,
+    square: f64,
+    split: usize,
+    flow: f64,
 }
 
 /// All that a search may end with.
@@ -164,48 +183,37 @@ impl SourceSearch {
             .chunks_exact(2)
             .map(|place| Vector2::new(place[0], place[1]))
             .collect();
-        if plan.is_some() && wind != (0.0, 0.0) {
-            return refused("wind", format!("{wind:?} with a plan"), "none: `flow` moves the air in rooms");
-        }
-        let instants = vector("instants", instants)?;
         let rate = match (rate.extract::<f64>(), rate.extract::<(f64, f64)>()) {
             (Ok(known), _) => RateModel::Known(known),
             (_, Ok((low, high))) => RateModel::Joint(RateRange::new(low, high)?),
             _ => return refused("rate", crate::array::shown(rate), "a number, or the lowest and the highest"),
         };
-        let ((left, low), (right, high)) = r#box;
-        let search = SearchBox {
-            lower: [left, low],
-            upper: [right, high],
-        };
-        if [left, low, right, high].iter().any(|x| !x.is_finite()) {
-            return refused("box", format!("{:?}", r#box), "finite corners");
-        }
-        let (field, sensor) = py.detach(|| -> Outcome<_> {
-            let sensor = match plan {
-                Some(plan) => {
-                    let field = rooms(plan, (square, split), diffusivity, flow, &places, &instants)?;
-                    SourceSensor::new(Arc::new(field), instants, noise)?
-                }
-                None => {
-                    let air = Air::new(diffusivity, Vector3::new(wind.0, wind.1, 0.0), Ground::Impermeable)?;
-                    SourceSensor::new(air, instants, noise)?
-                }
-            };
-            let nodes = Deployment::given(places)?;
-            let graph = Graph::within(nodes.positions(), reach)?;
-            Ok((SearchField::new(sensor.clone(), nodes, graph)?, sensor))
-        })?;
-        let made = Self {
-            field,
-            sensor,
+        let given = Setting {
+            places,
+            reach,
+            instants: vector("instants", instants)?,
+            noise,
+            diffusivity,
+            wind,
             rate,
-            search,
+            corners: r#box,
             threshold,
-            most: max_nodes,
+            max_nodes,
+            plan: plan.map(str::to_owned),
+            square,
+            split,
+            flow,
         };
-        made.about(0, 1.0)?;
-        Ok(made)
+        Self::of(py, given)
+    }
+
+    #[staticmethod]
+    fn _restored(py: Python<'_>, state: &Bound<'_, PyAny>) -> Outcome<Self> {
+        Self::of(py, stored::state(state)?)
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Outcome<Reduced<'py, (Bound<'py, PyBytes>,)>> {
+        Ok((maker::<Self>(py)?, (stored::bytes(py, &self.given)?,)))
     }
 
     /// The node nearest to a place.
@@ -331,13 +339,53 @@ fn rooms(
 }
 
 impl SourceSearch {
+    fn of(py: Python<'_>, given: Setting) -> Outcome<Self> {
+        if given.plan.is_some() && given.wind != (0.0, 0.0) {
+            return refused("wind", format!("{:?} with a plan", given.wind), "none: `flow` moves the air in rooms");
+        }
+        let ((left, low), (right, high)) = given.corners;
+        if [left, low, right, high].iter().any(|x| !x.is_finite()) {
+            return refused("box", format!("{:?}", given.corners), "finite corners");
+        }
+        let (field, sensor) = py.detach(|| -> Outcome<_> {
+            let instants = given.instants.clone();
+            let sensor = match &given.plan {
+                Some(plan) => {
+                    let squares = (given.square, given.split);
+                    let field = rooms(plan, squares, given.diffusivity, given.flow, &given.places, &instants)?;
+                    SourceSensor::new(Arc::new(field), instants, given.noise)?
+                }
+                None => {
+                    let wind = Vector3::new(given.wind.0, given.wind.1, 0.0);
+                    let air = Air::new(given.diffusivity, wind, Ground::Impermeable)?;
+                    SourceSensor::new(air, instants, given.noise)?
+                }
+            };
+            let nodes = Deployment::given(given.places.clone())?;
+            let graph = Graph::within(nodes.positions(), given.reach)?;
+            Ok((SearchField::new(sensor.clone(), nodes, graph)?, sensor))
+        })?;
+        let search = SearchBox {
+            lower: [left, low],
+            upper: [right, high],
+        };
+        let made = Self {
+            given,
+            field,
+            sensor,
+            search,
+        };
+        made.about(0, 1.0)?;
+        Ok(made)
+    }
+
     fn about(&self, start: usize, deviation: f64) -> Outcome<Search> {
         let nodes = self.field.deployment().positions();
         let Some(place) = nodes.get(start) else {
             return refused("start", start, format!("0 to {}, a node", nodes.len().saturating_sub(1)));
         };
-        let mut search = Search::new(place, deviation, self.search, self.rate, self.threshold)?;
-        search.max_nodes = self.most;
+        let mut search = Search::new(place, deviation, self.search, self.given.rate, self.given.threshold)?;
+        search.max_nodes = self.given.max_nodes;
         Ok(search)
     }
 }

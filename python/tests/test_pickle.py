@@ -170,6 +170,46 @@ def test_trackers():
     assert path[0].equals(path[1], null_equal=True)
 
 
+PLAN = '''
+####
+#..#
+I..O'''
+
+
+@pytest.mark.parametrize("rooms", [{}, {"plan": PLAN, "flow": 0.02}], ids=["open", "rooms"])
+@pytest.mark.parametrize("rate", [1.0, (0.5, 1.5)], ids=["known", "range"])
+def test_searches(rooms, rate):
+    places = [(0.5, 2.4), (1.5, 2.4), (2.5, 2.4), (1.5, 1.5), (2.5, 1.5)]
+    search = fb.SourceSearch(
+        places, reach=1.6, instants=[20.0, 60.0], noise=0.3, diffusivity=0.05, rate=rate, box=((0, 0), (4, 3)), max_nodes=4, **rooms
+    )
+    source = (1.4, 1.6)
+    rng = np.random.default_rng(3)
+    samples = [search.concentration(place, source) + 0.3 * rng.standard_normal(2) for place in places]
+    found = search.run(samples.__getitem__, start=1, deviation=2.0)
+    for other in (pickle.loads(pickle.dumps(search)), copy.copy(search)):
+        again = other.run(samples.__getitem__, start=1, deviation=2.0)
+        assert (found.status, found.bits) == (again.status, again.bits)
+        assert pl.DataFrame(found.visited).equals(pl.DataFrame(again.visited), null_equal=True) and np.array_equal(found.mean, again.mean)
+
+
+def calibrated():
+    rng = np.random.default_rng(2)
+    level = np.cumsum(0.3 * rng.standard_normal(120))
+    table = {"t": np.arange(120.0), "a": level + 0.2 * rng.standard_normal(120), "b": level + 2 + 0.4 * rng.standard_normal(120)}
+    return table, fb.fit(table, time="t", reference="a")
+
+
+def test_what_a_fit_found():
+    table, found = calibrated()
+    for other in (pickle.loads(pickle.dumps(found)), copy.deepcopy(found)):
+        for name in ("parameters", "refused", "tests", "correlations"):
+            assert pl.DataFrame(getattr(found, name)).equals(pl.DataFrame(getattr(other, name)), null_equal=True)
+        assert (found.first, found.log_likelihood, found.relative_to) == (other.first, other.log_likelihood, other.relative_to)
+        runs = [pl.DataFrame(one.centre(send="word:3").run(table, time="t")) for one in (found, other)]
+        assert runs[0].equals(runs[1], null_equal=True)
+
+
 def test_work_in_other_processes():
     model, times = fb.Model.walk(0.1), np.arange(20.0)
     filtered = fb.OneBit(a=0.9, process=0.5, noise=1.0)
@@ -181,7 +221,16 @@ def test_work_in_other_processes():
             assert np.array_equal(run.mean, filtered.run(path[:, 0], mean=0.0, variance=2.0).mean)
 
 
-@pytest.mark.parametrize("made", [fb.Model.walk(0.1), fb.Generator(1), fb.design(prior=(0.0, 1.0), noise=[1.0], bits=[1])])
+@pytest.mark.parametrize(
+    "made",
+    [
+        fb.Model.walk(0.1),
+        fb.Generator(1),
+        fb.design(prior=(0.0, 1.0), noise=[1.0], bits=[1]),
+        fb.SourceSearch([(0.0, 0.0)], reach=1.0, instants=[1.0], noise=1.0, diffusivity=1.0, rate=1.0, box=((0, 0), (1, 1))),
+        calibrated()[1],
+    ],
+)
 def test_bytes_that_are_no_state_are_refused(made):
     function, (state, *_) = made.__reduce__()
     for wrong in (b"", b"\x00", state[:-1], state + b"\x00", b"\x02" + state[1:], state[:1], "text", 3.0):

@@ -72,10 +72,10 @@ fn read(file: &Path) -> Result<Given, Error> {
     if !(configuration.deviation.is_finite() && configuration.deviation > 0.0) {
         return Err(configured(file)(format!("deviation is {}: expected above 0", configuration.deviation)));
     }
-    if let Place::Udp(address) = Place::of(&configuration.centre).map_err(configured(file))?
-        && address.ends_with(":0")
-    {
-        return Err(configured(file)(format!("centre is {address}: expected the port at which the centre listens")));
+    let place = Place::of(&configuration.centre).map_err(configured(file))?;
+    if matches!(&place, Place::Udp(address) if address.ends_with(":0")) {
+        let centre = &configuration.centre;
+        return Err(configured(file)(format!("centre is {centre}: expected the port at which the centre listens")));
     }
     Ok(Given {
         configuration,

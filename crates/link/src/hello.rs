@@ -17,9 +17,11 @@ const UNANSWERED_EVERY: Duration = Duration::from_secs(60);
 /// ```text
 /// nothing answers                  after 1, 2, 4, 8, 8, ... s
 /// answered, but not asked yet      after 1, 2, 4, ... 300 s
-/// asked                            when the next question is half an interval overdue, after 1 to 300 s
+/// asked, not told                  as if it was not asked
+/// asked and told                   when the next question is half an interval overdue, after 1 to 300 s
 /// ```
-/// While the centre asks, it knows the sensor's address, and no heartbeat is sent.
+/// A centre that asks knows the sensor's address. A sensor is told when a heartbeat was answered by what the centre takes its reports for:
+/// one that is silent shows in no other way that they mean something else.
 #[derive(Debug)]
 pub(crate) struct Hellos {
     at: Instant,
@@ -69,11 +71,14 @@ impl Hellos {
     }
 
     /// The centre has asked.
-    pub(crate) fn on_question(&mut self, now: Instant) {
+    pub(crate) fn on_question(&mut self, now: Instant, is_told: bool) {
         if let Some(asked_at) = self.asked_at.replace(now) {
             let gap = now.saturating_duration_since(asked_at);
             // A centre that was away for a day does not ask once a day from then on.
             self.interval = Some(self.interval.map_or(gap, |interval| gap.min(interval * 2)));
+        }
+        if !is_told {
+            return;
         }
         let overdue = self.interval.map_or(FIRST, |interval| interval + interval / 2);
         (self.at, self.pause) = (now + overdue.clamp(FIRST, LONGEST), FIRST);
@@ -126,10 +131,26 @@ mod tests {
                 hellos.on_answer(now);
             }
             if second % 3600 == 0 {
-                hellos.on_question(now);
+                hellos.on_question(now, true);
             }
         });
         assert!(said.is_empty() && sent.len() < 70, "{} heartbeats, {said:?}", sent.len());
+    }
+
+    /// Defect: a question of the centre ended the heartbeats of a sensor whose first one had not been answered. If it was silent, neither end
+    /// could say that its reports mean something else.
+    #[test]
+    fn heartbeats_go_on_until_the_sensor_is_told() {
+        let until = |told: u32| {
+            run(100, |second, _, hellos, now| {
+                hellos.on_answer(now);
+                hellos.on_question(now, second >= told);
+            })
+            .0
+        };
+        assert_eq!(until(101), [1, 2, 4, 8, 16, 32, 64]);
+        assert_eq!(until(8), [1, 2, 4, 8]);
+        assert_eq!(until(9), [1, 2, 4, 8]);
     }
 
     /// Slots of ten seconds: no heartbeat while questions come, one when a question is missing, and the rest as before it was asked.
@@ -138,7 +159,7 @@ mod tests {
         let (sent, said) = run(200, |second, _, hellos, now| {
             if second % 10 == 5 && second < 100 && second != 55 {
                 hellos.on_answer(now);
-                hellos.on_question(now);
+                hellos.on_question(now, true);
             }
         });
         // The first comes before any question, and after the first question the interval is not known.

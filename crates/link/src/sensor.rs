@@ -7,7 +7,7 @@ use crate::store::Store;
 use fewbits_core::BitString;
 use fewbits_numerics::error::refuse;
 use fewbits_protocol::{
-    Feedback, Frame, Kind, Note, Payload, Reaction, Sensor, SensorSettings, SensorTimer, Slot, Task,
+    DecodeError, Feedback, Frame, Kind, Note, Payload, Reaction, Sensor, SensorSettings, SensorTimer, Slot, Task,
 };
 use serde::{Deserialize, Serialize};
 
@@ -69,6 +69,8 @@ pub struct SensorLink {
     /// Bytes of the last report's frame.
     last: Vec<u8>,
     counts: Counts,
+    /// Whether the centre has said what it takes reports for.
+    is_told: bool,
 }
 
 impl SensorLink {
@@ -102,6 +104,7 @@ impl SensorLink {
             timer: (settings.feedback == Feedback::Clock).then_some((0, SensorTimer::SlotBegins)),
             last: Vec::new(),
             counts: Counts::default(),
+            is_told: settings.meaning == 0,
         })
     }
 
@@ -123,6 +126,12 @@ impl SensorLink {
     /// Whether the centre asks this sensor. One that reports by the clock may never hear anything.
     pub(crate) fn is_asked(&self) -> bool {
         self.sensor.settings().feedback == Feedback::Told
+    }
+
+    /// Whether the centre has said what it takes this sensor's reports for, or the sensor does not ask. A centre that began anew says it
+    /// again.
+    pub(crate) fn is_told(&self) -> bool {
+        self.is_told
     }
 
     /// A heartbeat that tells the centre the sensor's address. Send it repeatedly until a frame of the centre has come. A centre whose slot
@@ -170,7 +179,9 @@ impl SensorLink {
         // Counters of a centre rise from slot to slot. A question with a higher counter and an earlier slot is of a centre that began anew.
         if counter > before && self.is_before_answered(frame) {
             self.sensor = Sensor::new(*self.sensor.settings());
+            self.is_told = self.sensor.settings().meaning == 0;
         }
+        self.is_told |= matches!(self.decoded(frame), Ok(frame) if frame.kind == Kind::Heartbeat);
         let reaction = self.sensor.on_frame(now, frame);
         self.carry_out(reaction, requests)
     }
@@ -189,9 +200,13 @@ impl SensorLink {
         self.carry_out(reaction, requests)
     }
 
+    fn decoded<'a>(&self, frame: &'a [u8]) -> Result<Frame<'a>, DecodeError> {
+        Frame::decode(frame, self.sensor.settings().check)
+    }
+
     fn is_before_answered(&self, frame: &[u8]) -> bool {
         let asks = |kind| matches!(kind, Kind::Feedback | Kind::Echo | Kind::Snapshot);
-        match (self.sensor.answered(), Frame::decode(frame, self.sensor.settings().check)) {
+        match (self.sensor.answered(), self.decoded(frame)) {
             (Some(answered), Ok(frame)) if asks(frame.kind) => frame.slot != answered && !frame.slot.is_after(answered),
             _ => false,
         }

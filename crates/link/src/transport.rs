@@ -183,7 +183,7 @@ pub fn run_sensor<T: Transport>(
                     Request::Datagram(bytes) => transport.send(centre, &bytes),
                     Request::Note(note) => program.note(note),
                     Request::Sample { slot, feedback } => {
-                        hellos.on_question(Instant::now());
+                        hellos.on_question(Instant::now(), link.is_told());
                         let ControlFlow::Continue(report) = program.sample(slot, &feedback) else {
                             return Ok(());
                         };

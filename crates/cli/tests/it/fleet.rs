@@ -518,7 +518,6 @@ fn a_fault_of_the_fleets_key_is_no_second_one() {
 /// The files of centre and sensor say different reports, or numbers on which the meaning of a report depends: both ends name it, whether the
 /// lengths of reports and questions differ or not, and however silent the sensor is. Nothing of it is used.
 #[test]
-#[ignore = "thirteen processes: one run in three did not hear all of them within a minute"]
 fn reports_of_another_kind_are_named_at_both_ends() {
     let folder = tempfile::tempdir().unwrap();
     // In the centre's file, in the sensor's, deviation there, what the centre says of it.
