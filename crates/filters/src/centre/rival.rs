@@ -60,20 +60,21 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         readings: &[Reading<'_, D>],
         verdicts: &[Verdict],
     ) -> Option<(Rival<D>, Gaussian<D>)> {
-        let judged: Vec<(&Reading<'_, D>, Fate)> = readings
-            .iter()
-            .zip(verdicts)
-            .map(|(reading, verdict)| (reading, verdict.fate))
+        let is_suspect = |(reading, fate): &(&Reading<'_, D>, Fate)| {
+            let monitor = &self.members[reading.seat].state.monitor;
+            *fate == Fate::Rejected || monitor.contradiction(&self.limits.sensor) >= 1.0
+        };
+        let all = readings.iter().zip(verdicts.iter().map(|verdict| verdict.fate));
+        if self.rival.is_none() && !all.clone().any(|one| is_suspect(&one)) {
+            return None;
+        }
+        let judged: Vec<(&Reading<'_, D>, Fate)> = all
             .filter(|(reading, fate)| {
                 reading.content == Content::Report && reading.likelihood.is_some() && *fate != Fate::Excluded
             })
             .collect();
         let number = |reading: &Reading<'_, D>| self.members[reading.seat].number;
         let test = |reading: &Reading<'_, D>, given: &Gaussian<D>| self.members[reading.seat].test(reading, given);
-        let is_suspect = |(reading, fate): &(&Reading<'_, D>, Fate)| {
-            let monitor = &self.members[reading.seat].state.monitor;
-            *fate == Fate::Rejected || monitor.contradiction(&self.limits.sensor) >= 1.0
-        };
         let is_open = |rival: &&Rival<D>| {
             let state = self.member(rival.sensor).ok().map(|member| member.state);
             let mut own = judged.iter().filter(|(reading, _)| number(reading) == rival.sensor);
