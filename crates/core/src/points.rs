@@ -74,7 +74,7 @@ fn move_all<const D: usize>(
 ///
 /// # Errors
 /// [`Error::NotANumber`] if a moved point is not finite; the points are then unchanged.
-pub fn transport<const D: usize>(
+pub(crate) fn transport<const D: usize>(
     mut states: ColumnsMut<'_, D>,
     from: &Gaussian<D>,
     to: &Gaussian<D>,
@@ -107,7 +107,7 @@ pub(crate) fn check<const D: usize>(states: &mut ColumnsMut<'_, D>, weights: &[f
 /// # Errors
 /// [`Error::Impossible`] if the observation has probability zero; [`Error::NotANumber`] if a number overflows or is NaN; if there is not
 /// one weight per point. The points are then unchanged.
-pub fn move_points<const D: usize, const M: usize>(
+pub(crate) fn move_points<const D: usize, const M: usize>(
     mut states: ColumnsMut<'_, D>,
     weights: &[f64],
     observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
