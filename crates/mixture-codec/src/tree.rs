@@ -229,13 +229,8 @@ impl<const D: usize> Tree<D> {
         &self.nodes
     }
 
-    /// The node at `index`, or `None` past the end.
-    pub fn node(&self, index: usize) -> Option<&Node<D>> {
-        self.nodes.get(index)
-    }
-
     /// The kernels in the tree's order, in which those of a node are contiguous.
-    pub fn order(&self) -> &[usize] {
+    pub(crate) fn order(&self) -> &[usize] {
         &self.order
     }
 
