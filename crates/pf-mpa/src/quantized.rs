@@ -147,7 +147,7 @@ impl QuantizedRange {
     ///
     /// # Errors
     /// If there is no such level, or the reference is not valid.
-    pub fn cell(&self, level: Symbol, reference: &RangeReference) -> Result<Cell, ArgumentError> {
+    pub(crate) fn cell(&self, level: Symbol, reference: &RangeReference) -> Result<Cell, ArgumentError> {
         let nominal = reference.nominal_cell(level.0, self.levels())?;
         let (is_first, is_last) = (level.0 == 0, level.0 + 1 == self.levels());
         let lower = if is_first { f64::NEG_INFINITY } else { nominal.lower() };
