@@ -211,7 +211,7 @@ impl Default for FalseAlarms {
 impl FalseAlarms {
     /// A report is rejected if the probability of reports that are at most as likely is below this: ten times the rate of false alarms of
     /// a sensor, and at most 0.01. The loss of one report costs less than that of a sensor.
-    pub fn gate(&self) -> f64 {
+    pub(crate) fn gate(&self) -> f64 {
         (10.0 * self.sensor).min(0.01)
     }
 
