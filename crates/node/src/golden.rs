@@ -14,8 +14,8 @@
 //! |---|---|---|---|
 //! | `SignBit` | sample, threshold: f64 | | the bit |
 //! | `SignBitCodes` | sample, threshold: i32 | | the bit |
-//! | `InnovationWord` | sample, mean, deviation: f64 | thresholds [`THRESHOLDS`] | the cell, 2 bits |
-//! | `InnovationWordCodes` | sample, mean: i32; deviation: u32 | [`THRESHOLDS`] times 2^16, rounded | the cell, 2 bits |
+//! | `InnovationWord` | sample, mean, deviation: f64 | thresholds -0.982, 0 and 0.982 | the cell, 2 bits |
+//! | `InnovationWordCodes` | sample, mean: i32; deviation: u32 | these thresholds times 2^16, rounded | the cell, 2 bits |
 //! | `QuantizerWord` | sample: f64 | thresholds -20, -5, 0, 5, 20; words 0, 1, 3, 2, 6, 7 | the word, 3 bits |
 //! | `QuantizerWordCodes` | sample: u16 | thresholds 8000, 24000, 32768, 40000, 60000; the same words | the word, 3 bits |
 //! | `PatternBit` | sample: f64 | thresholds -10, 0, 10 | the bit |

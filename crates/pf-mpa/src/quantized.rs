@@ -157,7 +157,7 @@ impl QuantizedRange {
     /// The likelihood of a received level over a perfect link.
     ///
     /// # Errors
-    /// As [`QuantizedRange::cell`].
+    /// If there is no such level, or the reference is not valid.
     pub fn received(&self, level: Symbol, reference: &RangeReference) -> Result<Levels, ArgumentError> {
         Levels::certain(self.cell(level, reference)?, self.noise)
     }

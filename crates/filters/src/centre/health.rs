@@ -311,8 +311,8 @@ pub enum Health {
     Off,
     /// Reports are tested and events are returned. All reports are used, except those that cannot be.
     Report,
-    /// Reports that are too unlikely given the prediction and the others' are not used ([`FalseAlarms::gate`]); sensors that contradict the
-    /// others again and again are excluded.
+    /// Reports that are too unlikely given the prediction and the others' are not used: less likely than ten times the rate of false alarms of a
+    /// sensor, and at most 0.01. Sensors that contradict the others again and again are excluded.
     #[default]
     Exclude,
 }
