@@ -87,8 +87,8 @@ impl Likelihoods {
         }
     }
 
-    /// The columns of a table that the functions are for.
-    pub(crate) fn columns(&self, given: &Given, time: &str) -> Outcome<Vec<(String, Cells)>> {
+    /// What the table has for the functions.
+    pub(crate) fn observed(&self, given: &Given, time: &str) -> Outcome<Observed> {
         let names: Vec<String> = match self {
             Self::ByName(functions) => functions.iter().map(|(name, _)| name.clone()).collect(),
             Self::One(_) => {
@@ -100,32 +100,32 @@ impl Likelihoods {
                 others
             }
         };
-        names
-            .into_iter()
-            .map(|name| Ok((name.clone(), given.numbers(&name)?)))
-            .collect()
+        let columns = names.into_iter().map(|name| Ok((name.clone(), given.numbers(&name)?)));
+        Ok(Observed {
+            columns: columns.collect::<Outcome<_>>()?,
+            is_named: matches!(self, Self::ByName(_)),
+        })
     }
+}
 
-    /// The observation of one row, as `of` takes it.
-    pub(crate) fn row<'py>(
-        &self,
-        py: Python<'py>,
-        columns: &[(String, Cells)],
-        row: usize,
-    ) -> Outcome<Bound<'py, PyAny>> {
-        match self {
-            Self::One(_) => {
-                let cell = columns.first().and_then(|(_, cells)| cells[row]);
-                Ok(cell.into_pyobject(py).map_err(PyErr::from)?.into_any())
-            }
-            Self::ByName(_) => {
-                let observed = PyDict::new(py);
-                for (name, cells) in columns {
-                    observed.set_item(name, cells[row])?;
-                }
-                Ok(observed.into_any())
-            }
+/// The columns of a table that functions are for.
+pub(crate) struct Observed {
+    columns: Vec<(String, Cells)>,
+    is_named: bool,
+}
+
+impl Observed {
+    /// The observation of one row, as [`Likelihoods::of`] takes it.
+    pub(crate) fn row<'py>(&self, py: Python<'py>, row: usize) -> Outcome<Bound<'py, PyAny>> {
+        if !self.is_named {
+            let cell = self.columns.first().and_then(|(_, cells)| cells[row]);
+            return Ok(cell.into_pyobject(py).map_err(PyErr::from)?.into_any());
         }
+        let observed = PyDict::new(py);
+        for (name, cells) in &self.columns {
+            observed.set_item(name, cells[row])?;
+        }
+        Ok(observed.into_any())
     }
 }
 

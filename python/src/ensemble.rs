@@ -1,22 +1,21 @@
 //! The ensemble Kalman filter, with the user's dynamics and measurement as functions of all members at once.
 
 use crate::array::{matrix, shown};
-use crate::callbacks::{Likelihoods, returned, rising};
+use crate::callbacks::{Likelihoods, returned};
 use crate::error::{Failure, Outcome, refused};
 use crate::given::named;
 use crate::model::with_dimension;
 use crate::random::{self, Generator};
-use crate::sigma::{Sensor, of_columns, said, sensors};
+use crate::rows::Rows;
+use crate::sigma::{Sensor, moved, of_columns, said, sensors};
 use crate::stored::{self, Reduced};
-use crate::table::{Given, Table, doubles};
-use arrow_array::Int64Array;
+use crate::table::Table;
 use fewbits_core::Gaussian;
 use fewbits_core::points::move_measured_points;
 use fewbits_filters::Error;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use std::sync::Arc;
 
 /// The functions, and the state.
 type Parts<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyBytes>);
@@ -153,33 +152,14 @@ impl EnsembleFilter {
         table: &Bound<'_, PyAny>,
         #[pyo3(from_py_with = named)] time: &str,
     ) -> Outcome<Table> {
-        let given = Given::read(table)?;
-        let seconds = rising(&given.times(time)?)?;
-        let columns = self.measures.columns(&given, time)?;
-        let (mut states, mut logs, mut sent) = (vec![Vec::new(); 2 * self.members.len()], Vec::new(), Vec::new());
-        let mut now = 0.0;
-        for (row, second) in seconds.into_iter().enumerate() {
-            py.check_signals()?;
-            let observation = self.measures.row(py, &columns, row)?;
-            let (log, bits) = self.advanced(py, Some(&observation), second - now)?;
-            now = second;
-            logs.push(log);
+        let (mut rows, mut sent) = (Rows::read(table, time, &self.measures, self.members.len())?, Vec::new());
+        while let Some((observation, [before, now])) = rows.next(py)? {
+            let (log, bits) = self.advanced(py, Some(&observation), now - before)?;
+            let all = self.members.iter().map(|column| moments(column));
+            rows.push(log, all.map(|(mean, variance)| (mean, variance.sqrt())));
             sent.push(bits);
-            for (i, column) in self.members.iter().enumerate() {
-                let (mean, variance) = moments(column);
-                states[2 * i].push(mean);
-                states[2 * i + 1].push(variance.sqrt());
-            }
         }
-        let rows: Vec<usize> = (0..logs.len()).collect();
-        let mut columns = vec![(time.to_owned(), given.taken(time, &rows)?)];
-        for (i, state) in states.into_iter().enumerate() {
-            let deviation = if i % 2 == 1 { "_sd" } else { "" };
-            columns.push((format!("x{}{deviation}", i / 2), doubles(state)));
-        }
-        columns.push(("log_likelihood".to_owned(), doubles(logs)));
-        columns.push(("bits".to_owned(), Arc::new(Int64Array::from(sent))));
-        Table::new(columns)
+        rows.table(Some(sent))
     }
 
     /// The members, (d, n).
@@ -217,22 +197,14 @@ impl EnsembleFilter {
         let (d, n) = (next.len(), next.first().map_or(0, Vec::len));
         if dt > 0.0 {
             let given = of_columns(py, next.clone())?;
-            let moved = self.transition.bind(py).call1((&given, dt, self.generator.bind(py)))?;
-            let moved = if moved.is_none() { given.into_any() } else { moved };
-            let (rows, columns, numbers) = matrix("move", &moved)?;
-            if (rows, columns) != (d, n) {
-                let expected = format!("an array of shape ({d}, {n}), as the members");
-                return refused("move", shown(&moved), expected);
-            }
-            if !numbers.iter().all(|x| x.is_finite()) {
+            let returned = self.transition.bind(py).call1((&given, dt, self.generator.bind(py)))?;
+            moved("members", given, returned, &mut next)?;
+            if !next.iter().flatten().all(|x| x.is_finite()) {
                 return Err(Error::NotANumber { what: "a member" }.into());
             }
-            for (column, moved) in next.iter_mut().zip(numbers.chunks_exact(n)) {
-                column.copy_from_slice(moved);
-                if self.inflation > 1.0 {
-                    let mean = moments(column).0;
-                    column.iter_mut().for_each(|x| *x = mean + (*x - mean) * self.inflation);
-                }
+            for column in next.iter_mut().filter(|_| self.inflation > 1.0) {
+                let mean = moments(column).0;
+                column.iter_mut().for_each(|x| *x = mean + (*x - mean) * self.inflation);
             }
         }
         let (mut log_likelihood, mut bits) = (0.0, 0);

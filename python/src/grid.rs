@@ -1,11 +1,12 @@
 //! The exact filter of a scalar state on a grid, with the user's dynamics and likelihood as functions of all nodes at once.
 
-use crate::callbacks::{Likelihoods, returned, rising};
+use crate::callbacks::{Likelihoods, returned};
 use crate::error::{Outcome, refused};
 use crate::given::named;
 use crate::nodes::{Kept, Parts, callable, dt_of, step};
+use crate::rows::Rows;
 use crate::stored::{self, Reduced};
-use crate::table::{Given, Table, doubles};
+use crate::table::Table;
 use fewbits_filters::{PointMass, TransitionKernel, UniformGrid};
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -127,26 +128,12 @@ impl GridFilter {
         table: &Bound<'_, PyAny>,
         #[pyo3(from_py_with = named)] time: &str,
     ) -> Outcome<Table> {
-        let given = Given::read(table)?;
-        let seconds = rising(&given.times(time)?)?;
-        let columns = self.likelihoods.columns(&given, time)?;
-        let (mut means, mut deviations, mut logs) = (Vec::new(), Vec::new(), Vec::new());
-        let mut now = 0.0;
-        for (row, second) in seconds.into_iter().enumerate() {
-            py.check_signals()?;
-            let observation = self.likelihoods.row(py, &columns, row)?;
-            logs.push(self.step(py, Some(observation), dt_of(second, now))?);
-            now = second;
-            means.push(self.belief.mean());
-            deviations.push(self.belief.variance().max(0.0).sqrt());
+        let mut rows = Rows::read(table, time, &self.likelihoods, 1)?;
+        while let Some((observation, [before, now])) = rows.next(py)? {
+            let log = self.step(py, Some(observation), dt_of(now, before))?;
+            rows.push(log, [(self.belief.mean(), self.belief.variance().max(0.0).sqrt())]);
         }
-        let rows: Vec<usize> = (0..means.len()).collect();
-        Table::new(vec![
-            (time.to_owned(), given.taken(time, &rows)?),
-            ("x0".to_owned(), doubles(means)),
-            ("x0_sd".to_owned(), doubles(deviations)),
-            ("log_likelihood".to_owned(), doubles(logs)),
-        ])
+        rows.table(None)
     }
 
     /// The nodes.

@@ -1,12 +1,13 @@
 //! The exact filter of several numbers on a lattice, with the user's dynamics and likelihood as functions of all nodes at once.
 
 use crate::array::{matrix, vector};
-use crate::callbacks::{Likelihoods, rising};
+use crate::callbacks::Likelihoods;
 use crate::error::{Failure, Outcome, refused};
 use crate::given::named;
 use crate::nodes::{Kept, Parts, callable, dt_of, step};
+use crate::rows::Rows;
 use crate::stored::{self, Reduced};
-use crate::table::{Given, Table, doubles};
+use crate::table::Table;
 use fewbits_filters::{Lattice, LatticeKernel as Kernel, UniformGrid};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -126,27 +127,13 @@ impl LatticeFilter {
         table: &Bound<'_, PyAny>,
         #[pyo3(from_py_with = named)] time: &str,
     ) -> Outcome<Table> {
-        let given = Given::read(table)?;
-        let seconds = rising(&given.times(time)?)?;
-        let columns = self.likelihoods.columns(&given, time)?;
-        let (mut moments, mut logs, mut now) = (vec![Vec::new(); 2 * self.belief.axes().len()], Vec::new(), 0.0);
-        for (row, second) in seconds.into_iter().enumerate() {
-            py.check_signals()?;
-            let observation = self.likelihoods.row(py, &columns, row)?;
-            logs.push(self.step(py, Some(observation), dt_of(second, now))?);
-            now = second;
-            for (axis, (mean, variance)) in self.belief.moments().into_iter().enumerate() {
-                moments[2 * axis].push(mean);
-                moments[2 * axis + 1].push(variance.max(0.0).sqrt());
-            }
+        let mut rows = Rows::read(table, time, &self.likelihoods, self.belief.axes().len())?;
+        while let Some((observation, [before, now])) = rows.next(py)? {
+            let log = self.step(py, Some(observation), dt_of(now, before))?;
+            let all = self.belief.moments().into_iter();
+            rows.push(log, all.map(|(mean, variance)| (mean, variance.max(0.0).sqrt())));
         }
-        let rows: Vec<usize> = (0..logs.len()).collect();
-        let mut made = vec![(time.to_owned(), given.taken(time, &rows)?)];
-        for (i, column) in moments.into_iter().enumerate() {
-            made.push((format!("x{}{}", i / 2, if i % 2 == 1 { "_sd" } else { "" }), doubles(column)));
-        }
-        made.push(("log_likelihood".to_owned(), doubles(logs)));
-        Table::new(made)
+        rows.table(None)
     }
 
     /// The nodes, a coordinate in each row.

@@ -1,14 +1,14 @@
 //! The unscented and the cubature Kalman filter, with the user's dynamics and measurement as functions of all points at once.
 
 use crate::array::{matrix, shown, vector};
-use crate::callbacks::{Likelihoods, returned, rising};
+use crate::callbacks::{Likelihoods, returned};
 use crate::error::{Failure, Outcome, refused};
 use crate::given::named;
 use crate::model::{square, with_dimension};
+use crate::rows::Rows;
 use crate::seat::Sends;
 use crate::stored::{self, Reduced};
-use crate::table::{Given, Table, doubles};
-use arrow_array::Int64Array;
+use crate::table::Table;
 use fewbits_core::factor::{Scalar, Value};
 use fewbits_core::{Gaussian, Link, Observation, Scheme};
 use fewbits_dymbo::{InnovationWord, Prediction, SignBit};
@@ -19,7 +19,6 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// What is known of the sensor of a column.
 #[derive(Clone, Serialize, Deserialize)]
@@ -349,33 +348,19 @@ impl SigmaPointFilter {
         table: &Bound<'_, PyAny>,
         #[pyo3(from_py_with = named)] time: &str,
     ) -> Outcome<Table> {
-        let given = Given::read(table)?;
-        let seconds = rising(&given.times(time)?)?;
-        let columns = self.measures.columns(&given, time)?;
-        let (mut states, mut logs, mut sent) = (vec![Vec::new(); 2 * self.dimension], Vec::new(), Vec::new());
-        let mut now = 0.0;
-        for (row, second) in seconds.into_iter().enumerate() {
-            py.check_signals()?;
-            let observation = self.measures.row(py, &columns, row)?;
-            let (log, bits) = self.advanced(py, Some(&observation), second - now)?;
-            now = second;
-            logs.push(log);
-            sent.push(bits);
+        let (mut rows, mut sent) = (Rows::read(table, time, &self.measures, self.dimension)?, Vec::new());
+        while let Some((observation, [before, now])) = rows.next(py)? {
+            let (log, bits) = self.advanced(py, Some(&observation), now - before)?;
             let (mean, covariance) = self.rule.moments();
-            for (i, mean) in mean.into_iter().enumerate() {
-                states[2 * i].push(mean);
-                states[2 * i + 1].push(covariance[i][i].sqrt());
-            }
+            rows.push(
+                log,
+                mean.into_iter()
+                    .enumerate()
+                    .map(|(i, mean)| (mean, covariance[i][i].sqrt())),
+            );
+            sent.push(bits);
         }
-        let rows: Vec<usize> = (0..logs.len()).collect();
-        let mut columns = vec![(time.to_owned(), given.taken(time, &rows)?)];
-        for (i, state) in states.into_iter().enumerate() {
-            let deviation = if i % 2 == 1 { "_sd" } else { "" };
-            columns.push((format!("x{}{deviation}", i / 2), doubles(state)));
-        }
-        columns.push(("log_likelihood".to_owned(), doubles(logs)));
-        columns.push(("bits".to_owned(), Arc::new(Int64Array::from(sent))));
-        Table::new(columns)
+        rows.table(Some(sent))
     }
 
     /// Mean of the belief.
@@ -406,18 +391,8 @@ impl SigmaPointFilter {
             };
             next.predict(&noise, &mut |points| {
                 let given = of_columns(py, points.iter().map(|column| column.to_vec()).collect())?;
-                let moved = self.transition.bind(py).call1((&given, dt))?;
-                let moved = if moved.is_none() { given.into_any() } else { moved };
-                let (rows, columns, numbers) = matrix("move", &moved)?;
-                let count = points.first().map_or(0, |column| column.len());
-                if (rows, columns) != (points.len(), count) {
-                    let expected = format!("an array of shape ({}, {count}), as the points", points.len());
-                    return refused("move", shown(&moved), expected);
-                }
-                for (point, moved) in points.iter_mut().zip(numbers.chunks_exact(count)) {
-                    point.copy_from_slice(moved);
-                }
-                Ok(())
+                let returned = self.transition.bind(py).call1((&given, dt))?;
+                moved("points", given, returned, points)
             })?;
         }
         let (mut log_likelihood, mut bits) = (0.0, 0);
@@ -441,6 +416,26 @@ impl SigmaPointFilter {
         self.rule = next;
         Ok((log_likelihood, bits))
     }
+}
+
+/// Replaces columns by what a function of the user made of them in place, or returned.
+pub(crate) fn moved<'py, C: AsMut<[f64]>>(
+    what: &str,
+    given: Bound<'py, PyArray2<f64>>,
+    returned: Bound<'py, PyAny>,
+    columns: &mut [C],
+) -> Outcome<()> {
+    let returned = if returned.is_none() { given.into_any() } else { returned };
+    let (rows, own, numbers) = matrix("move", &returned)?;
+    let count = columns.first_mut().map_or(0, |column| column.as_mut().len());
+    if (rows, own) != (columns.len(), count) {
+        let expected = format!("an array of shape ({}, {count}), as the {what}", columns.len());
+        return refused("move", shown(&returned), expected);
+    }
+    for (column, moved) in columns.iter_mut().zip(numbers.chunks_exact(count)) {
+        column.as_mut().copy_from_slice(moved);
+    }
+    Ok(())
 }
 
 pub(crate) fn of_columns(py: Python<'_>, columns: Vec<Vec<f64>>) -> Outcome<Bound<'_, PyArray2<f64>>> {

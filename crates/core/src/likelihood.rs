@@ -47,7 +47,7 @@ pub trait Likelihood<const D: usize>: Send + Sync {
     }
 
     /// Moves points whose weights sum to one so that they have the moments of the posterior. A sensing model is regressed on the points
-    /// instead of being linearised ([`points::move_points`]); by default the points follow [`condition`](Self::condition) of their moments.
+    /// instead of being linearised ([`points::move_measured_points`]); by default the points follow [`condition`](Self::condition) of their moments.
     ///
     /// # Errors
     /// As [`condition`](Self::condition), or if there is not one weight per point. The points are then unchanged.

@@ -283,16 +283,6 @@ impl Table {
         Ok(Self { names, rows })
     }
 
-    /// Number of rows.
-    pub fn len(&self) -> usize {
-        self.rows.len()
-    }
-
-    /// Whether there is no row.
-    pub fn is_empty(&self) -> bool {
-        self.rows.is_empty()
-    }
-
     fn columns<const N: usize>(&self, names: [&str; N]) -> Result<[usize; N], Error> {
         self.any_columns(names.map(|name| [name, name]))
     }

@@ -53,7 +53,7 @@ impl<const D: usize> SentBelief<D> {
     }
 
     /// Mean and covariance.
-    pub fn gaussian(&self) -> Gaussian<D> {
+    pub(crate) fn gaussian(&self) -> Gaussian<D> {
         match self {
             Self::Mixture(mixture) => mixture.moment_matched(),
             Self::Other(density) => density.gaussian(),

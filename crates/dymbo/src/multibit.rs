@@ -87,7 +87,7 @@ impl MultibitFilter {
     }
 
     /// Per word: `E[z | word received]` and the word's probability, `z` the normalised innovation.
-    pub fn levels(&self) -> &[(f64, f64)] {
+    pub(crate) fn levels(&self) -> &[(f64, f64)] {
         &self.levels
     }
 }

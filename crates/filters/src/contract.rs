@@ -49,7 +49,7 @@ pub struct Points<const D: usize> {
 
 impl<const D: usize> Points<D> {
     /// The coordinates as columns.
-    pub fn columns(&self) -> fewbits_core::Columns<'_, D> {
+    pub(crate) fn columns(&self) -> fewbits_core::Columns<'_, D> {
         self.states.each_ref().map(Vec::as_slice)
     }
 }

@@ -54,7 +54,7 @@ impl Split {
 /// A node of a [`Tree`]: a contiguous range of kernels in the tree's order, and their moments.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Node<const D: usize> {
-    /// Range of positions in [`Tree::order`].
+    /// Its kernels as a range of positions in the tree's order, in which those of a node are contiguous.
     pub range: Range<usize>,
     /// Indices of the two children; `None` for a leaf.
     pub children: Option<[usize; 2]>,
@@ -229,13 +229,8 @@ impl<const D: usize> Tree<D> {
         &self.nodes
     }
 
-    /// The node at `index`, or `None` past the end.
-    pub fn node(&self, index: usize) -> Option<&Node<D>> {
-        self.nodes.get(index)
-    }
-
     /// The kernels in the tree's order, in which those of a node are contiguous.
-    pub fn order(&self) -> &[usize] {
+    pub(crate) fn order(&self) -> &[usize] {
         &self.order
     }
 

@@ -14,8 +14,8 @@
 //! |---|---|---|---|
 //! | `SignBit` | sample, threshold: f64 | | the bit |
 //! | `SignBitCodes` | sample, threshold: i32 | | the bit |
-//! | `InnovationWord` | sample, mean, deviation: f64 | thresholds [`THRESHOLDS`] | the cell, 2 bits |
-//! | `InnovationWordCodes` | sample, mean: i32; deviation: u32 | [`THRESHOLDS`] times 2^16, rounded | the cell, 2 bits |
+//! | `InnovationWord` | sample, mean, deviation: f64 | thresholds -0.982, 0 and 0.982 | the cell, 2 bits |
+//! | `InnovationWordCodes` | sample, mean: i32; deviation: u32 | these thresholds times 2^16, rounded | the cell, 2 bits |
 //! | `QuantizerWord` | sample: f64 | thresholds -20, -5, 0, 5, 20; words 0, 1, 3, 2, 6, 7 | the word, 3 bits |
 //! | `QuantizerWordCodes` | sample: u16 | thresholds 8000, 24000, 32768, 40000, 60000; the same words | the word, 3 bits |
 //! | `PatternBit` | sample: f64 | thresholds -10, 0, 10 | the bit |
@@ -38,7 +38,7 @@ pub const VERSION: u8 = 2;
 /// Number of records in a file.
 pub const RECORDS: u32 = 300;
 /// Thresholds of the words of the innovation: the four-level Lloyd-Max quantizer of the normal density, rounded to three decimals.
-pub const THRESHOLDS: [f64; 3] = [-0.982, 0.0, 0.982];
+const THRESHOLDS: [f64; 3] = [-0.982, 0.0, 0.982];
 const CODE_THRESHOLDS: [i32; 3] = [-64_356, 0, 64_356];
 const QUANTIZER: [f64; 5] = [-20.0, -5.0, 0.0, 5.0, 20.0];
 const QUANTIZER_CODES: [u16; 5] = [8_000, 24_000, 32_768, 40_000, 60_000];
@@ -351,14 +351,14 @@ pub fn hash(scheme: Scheme, count: u32) -> Result<u64, Error> {
 
 /// Running checksum of messages (FNV-1a of 64 bits).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Hash(pub u64);
+pub(crate) struct Hash(pub u64);
 
 impl Hash {
     /// The checksum before the first message.
-    pub const START: Self = Self(0xcbf2_9ce4_8422_2325);
+    pub(crate) const START: Self = Self(0xcbf2_9ce4_8422_2325);
 
     /// Adds one message, or silence, to the checksum.
-    pub fn add(&mut self, message: Option<Packet>) {
+    pub(crate) fn add(&mut self, message: Option<Packet>) {
         let packet = message.unwrap_or_default();
         self.byte(packet.bits() as u8);
         for byte in packet.to_bytes().iter().take(packet.byte_count()) {

@@ -10,7 +10,7 @@ pub struct Packet {
 
 impl Packet {
     /// Largest length of a packet in bits.
-    pub const MAX_BITS: u32 = 128;
+    const MAX_BITS: u32 = 128;
 
     /// The low `bits` bits of `word`. `None` if `bits` exceeds 128 or a higher bit of `word` is set.
     pub fn from_word(word: u128, bits: u32) -> Option<Self> {

@@ -9,7 +9,7 @@
 //! | [`linalg`], [`tridiagonal`], [`eigen`] | square roots of singular covariances, tridiagonal systems, eigenvalues |
 //! | [`roots`], [`newton`] | roots inside a bracket, without and with a derivative |
 //! | [`bisect`], [`golden`] | the place where a condition changes; the maximum of a function with one peak |
-//! | [`binomial`], [`LogSum`] | binomial coefficients, sums of exponentials that arrive one by one |
+//! | [`binomial`], [`LogSum`], [`Runs`] | binomial coefficients, sums of exponentials that arrive one by one, runs of equal values |
 //! | [`mod@stored`] | serde forms of matrices and of numbers that may be infinite |
 //! | [`wild`] | extreme numbers for tests: NaN, infinities, the ends of the range |
 //! | [`error`] | the argument error all constructors share, and the checks that raise it |
@@ -44,6 +44,8 @@ pub mod normal;
 #[cfg(feature = "std")]
 pub mod quadrature;
 #[cfg(feature = "std")]
+mod runs;
+#[cfg(feature = "std")]
 mod solvers;
 #[cfg(feature = "std")]
 pub mod stored;
@@ -56,5 +58,7 @@ pub use error::ArgumentError;
 pub use linear_algebra::{eigen, factored, linalg, tridiagonal};
 #[cfg(feature = "std")]
 pub use log_sum::LogSum;
+#[cfg(feature = "std")]
+pub use runs::Runs;
 #[cfg(feature = "std")]
 pub use solvers::{bisect, golden, newton, roots};

@@ -147,7 +147,7 @@ impl QuantizedRange {
     ///
     /// # Errors
     /// If there is no such level, or the reference is not valid.
-    pub fn cell(&self, level: Symbol, reference: &RangeReference) -> Result<Cell, ArgumentError> {
+    pub(crate) fn cell(&self, level: Symbol, reference: &RangeReference) -> Result<Cell, ArgumentError> {
         let nominal = reference.nominal_cell(level.0, self.levels())?;
         let (is_first, is_last) = (level.0 == 0, level.0 + 1 == self.levels());
         let lower = if is_first { f64::NEG_INFINITY } else { nominal.lower() };
@@ -157,7 +157,7 @@ impl QuantizedRange {
     /// The likelihood of a received level over a perfect link.
     ///
     /// # Errors
-    /// As [`QuantizedRange::cell`].
+    /// If there is no such level, or the reference is not valid.
     pub fn received(&self, level: Symbol, reference: &RangeReference) -> Result<Levels, ArgumentError> {
         Levels::certain(self.cell(level, reference)?, self.noise)
     }

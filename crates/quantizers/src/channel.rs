@@ -2,7 +2,7 @@
 
 use crate::error::{Error, refuse};
 use crate::labelling::Labelling;
-use fewbits_numerics::error::entries;
+
 use fewbits_numerics::normal;
 use serde::{Deserialize, Serialize};
 
@@ -198,19 +198,6 @@ impl Channel {
         } else {
             0.0
         }
-    }
-
-    /// Distribution of the received symbol, given the probabilities of the levels.
-    ///
-    /// # Errors
-    /// If there is not one probability per input, one is not in `[0, 1]`, or their sum is not 1.
-    pub fn received(&self, levels: &[f64]) -> Result<Vec<f64>, Error> {
-        fewbits_numerics::error::probabilities("levels", levels)?;
-        entries("levels", levels.len(), self.inputs)?;
-        let rows = self.transition.chunks_exact(self.inputs);
-        Ok(rows
-            .map(|row| row.iter().zip(levels).map(|(c, p)| c * p).sum())
-            .collect())
     }
 
     /// Whether the channel is the identity.

@@ -5,8 +5,8 @@ use crate::density::edges;
 use crate::error::{Error, refuse};
 use fewbits_core::Cell;
 use fewbits_core::factor::{Constant, Levels, Scalar};
+use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, entries, finite, positive};
-use fewbits_numerics::{ArgumentError, normal};
 use serde::{Deserialize, Serialize};
 
 /// Increasing breakpoints that divide the line into cells, and the level that is reported for each cell.
@@ -167,21 +167,6 @@ impl Quantizer {
         (cell < self.cells()).then(|| Cell::new(lower, upper).ok()).flatten()
     }
 
-    /// Probability of each level for a sample `N(mean, deviation^2)`, computed as a sum of positive terms.
-    ///
-    /// # Errors
-    /// If `mean` is not finite or `deviation` is not a positive number.
-    pub fn level_probabilities(&self, mean: f64, deviation: f64) -> Result<Vec<f64>, Error> {
-        finite("mean", mean)?;
-        positive("deviation", deviation)?;
-        let mut levels = vec![0.0; self.levels];
-        for (cell, label) in self.labels.iter().enumerate() {
-            let (lower, upper) = self.edges(cell);
-            levels[*label] += normal::interval((lower - mean) / deviation, (upper - mean) / deviation);
-        }
-        Ok(levels)
-    }
-
     /// `p(symbol received | h(x) = m)` for a sample `m + n`, `n ~ N(0, noise_variance)`, whose level is sent over `channel`.
     ///
     /// A symbol that no level can cause has a factor of probability 0.
@@ -287,8 +272,14 @@ mod tests {
         let q = Quantizer::with_labels(vec![-1.0, 0.3, 1.2], vec![0, 1, 2, 0]).unwrap();
         let channel = Channel::symbol_erasure(3, 0.2).unwrap();
         for m in [-3.0, 0.0, 0.7] {
-            let received = channel.received(&q.level_probabilities(m, 0.5).unwrap()).unwrap();
-            for (symbol, p) in received.iter().enumerate() {
+            let mut levels = [0.0; 3];
+            for (cell, level) in q.labels().iter().enumerate() {
+                levels[*level] += q.cell(cell).unwrap().log_probability(m, 0.5).exp();
+            }
+            for symbol in 0..channel.outputs() {
+                let p: f64 = (0..3)
+                    .map(|level| levels[level] * channel.probability(symbol, level))
+                    .sum();
                 let factor = q.factor(symbol, &channel, 0.25).unwrap();
                 assert!((factor.log_likelihood(&[m].into()).exp() - p).abs() < 1e-14);
             }

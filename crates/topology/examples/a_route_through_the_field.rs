@@ -16,8 +16,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         print!(
             "range {range:2}: {:5.1} neighbours, {:3} pieces, {:3.0} % of the nodes in the largest; ",
             2.0 * graph.edges() as f64 / graph.len() as f64,
-            components.sizes().len(),
-            100.0 * components.largest_share(),
+            components.sizes.len(),
+            100.0 * components.sizes.iter().copied().max().unwrap_or(0) as f64 / graph.len() as f64,
         );
         match hops.route(corner) {
             Some(route) => println!("{} hops from corner to corner", route.len() - 1),

@@ -52,31 +52,10 @@ impl Hops {
 /// The connected components of a network.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Components {
-    labels: Vec<u32>,
-    sizes: Vec<usize>,
-}
-
-impl Components {
-    /// Number of the component that contains a node. Components are numbered in the order of their lowest node.
-    pub fn label(&self, node: usize) -> Option<usize> {
-        self.labels.get(node).map(|label| *label as usize)
-    }
-
-    /// Number of nodes of each component.
-    pub fn sizes(&self) -> &[usize] {
-        &self.sizes
-    }
-
-    /// Whether there is a route between any two nodes.
-    pub fn is_connected(&self) -> bool {
-        self.sizes.len() <= 1
-    }
-
-    /// Share of the nodes in the largest component.
-    pub fn largest_share(&self) -> f64 {
-        let largest = self.sizes.iter().copied().max().unwrap_or(0);
-        largest as f64 / self.labels.len().max(1) as f64
-    }
+    /// Component of each node. Components are numbered in the order of their lowest node.
+    pub labels: Vec<u32>,
+    /// Number of nodes of each component. A connected network has one.
+    pub sizes: Vec<usize>,
 }
 
 impl Graph {

@@ -1,6 +1,6 @@
 //! The fusion centre for sensors that all measure the same level.
 
-use super::instant::{Instant, Said};
+use super::instant::{Instant, Qualifier};
 use super::meaning::Seat;
 use super::sensors;
 use super::world::World;
@@ -189,21 +189,21 @@ impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
         })
     }
 
-    fn slot(&mut self, sensor: usize, cell: Option<f64>, said: Said) -> Result<Slot, Failure> {
+    fn slot(&mut self, sensor: usize, cell: Option<f64>, qualifier: Qualifier) -> Result<Slot, Failure> {
         let number = sensor as u32;
         let member = &mut self.members[sensor];
         if member.seat.is_stated() {
             let expected = self.centre.estimate().mean()[0];
             let cell = cell.filter(|cell| cell.is_finite());
             let cell = cell.map(|cell| nearest(cell - member.seat.offset, expected, self.period));
-            let reading = member.seat.reading(cell, said, member.last);
+            let reading = member.seat.reading(cell, qualifier, member.last);
             member.last = cell.or(member.last);
             let bits = reading
                 .map(|reading| reading.to_bits(&NumberFormat::Double))
                 .transpose()?;
             return Ok(Slot::new(number, self.centre.feedback(number)?, Observation::from(bits)));
         }
-        let feedback = match said.threshold.or(member.seat.threshold) {
+        let feedback = match qualifier.threshold.or(member.seat.threshold) {
             // Only bits are told a threshold.
             Some(threshold) if member.seat.sends == Report::Sign => sensors::double(threshold - member.seat.offset)?,
             _ => self.centre.feedback(number)?,
@@ -268,7 +268,7 @@ impl<const D: usize, F: StateFilter<D>> Estimator for Centre<D, F> {
         let mut slots = Vec::with_capacity(instant.reports.len());
         let (mut bits, mut reports) = (0, 0);
         for (i, (sensor, cell)) in instant.reports.iter().enumerate() {
-            let slot = self.slot(*sensor, *cell, instant.said.get(i).copied().unwrap_or_default())?;
+            let slot = self.slot(*sensor, *cell, instant.qualifiers.get(i).copied().unwrap_or_default())?;
             if let Some(report) = slot.observation.received() {
                 let is_stated = self.members[*sensor].seat.is_stated();
                 // What a value means beside its number is known without being sent.

@@ -3,7 +3,7 @@
 use super::applied::{Found, Sensor};
 use super::columns::Kind;
 use super::first::values_of;
-use super::instant::{Instant, Said};
+use super::instant::{Instant, Qualifier};
 use super::rows::Instants;
 use crate::Ending;
 use crate::bounds::PerColumn;
@@ -115,8 +115,8 @@ fn readings(
     names: &[String],
     file: &str,
 ) -> Result<Vec<calibration::Instant>, Error> {
-    let reading = |row: u64, sensor: usize, cell: f64, said: Option<&Said>| {
-        match said.and_then(|said| said.limit) {
+    let reading = |row: u64, sensor: usize, cell: f64, qualifier: Option<&Qualifier>| {
+        match qualifier.and_then(|one| one.limit) {
             Some(Side::Below) => {
                 return Ok(Reading::Within {
                     lower: f64::NEG_INFINITY,
@@ -150,12 +150,12 @@ fn readings(
         let cells = one.reports.iter().enumerate();
         let cells = cells.filter_map(|(i, (sensor, cell))| {
             let cell = cell.filter(|cell| cell.is_finite())?;
-            Some((*sensor, cell, one.said.get(i)))
+            Some((*sensor, cell, one.qualifiers.get(i)))
         });
         Ok(calibration::Instant {
             seconds: one.seconds,
             values: cells
-                .map(|(sensor, cell, said)| Ok((sensor, reading(one.row, sensor, cell, said)?)))
+                .map(|(sensor, cell, qualifier)| Ok((sensor, reading(one.row, sensor, cell, qualifier)?)))
                 .collect::<Result<_, Error>>()?,
         })
     };

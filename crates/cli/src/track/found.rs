@@ -1,7 +1,7 @@
 //! What is found from the first rows: prior, change, noise of each sensor, steps of rounding.
 
 use super::first::{steepest, values, values_of};
-use super::instant::{Instant, Said};
+use super::instant::{Instant, Qualifier};
 use super::meaning::Seat;
 use super::settings::Settings;
 use super::world::World;
@@ -131,17 +131,17 @@ impl Settings {
             .map(|sensor| self.seat_with(sensor, Report::Value, self.noise, None))
             .collect();
         let mut last = vec![None; names.len()];
-        let mut reading = |sensor: usize, cell: Option<f64>, said: Said| {
+        let mut reading = |sensor: usize, cell: Option<f64>, qualifier: Qualifier| {
             let seat = seats.get(sensor)?;
             let cell = cell.filter(|cell| cell.is_finite()).map(|cell| cell - seat.offset);
-            let found = seat.reading(cell, said, last[sensor])?;
+            let found = seat.reading(cell, qualifier, last[sensor])?;
             last[sensor] = cell.or(last[sensor]);
             Some((
                 sensor,
                 if found.lower == found.upper {
                     calibration::Reading::Value {
                         value: found.lower,
-                        deviation: said.accuracy.filter(|accuracy| *accuracy > 0.0),
+                        deviation: qualifier.accuracy.filter(|accuracy| *accuracy > 0.0),
                     }
                 } else {
                     calibration::Reading::Within {
@@ -160,7 +160,7 @@ impl Settings {
                     .iter()
                     .enumerate()
                     .filter_map(|(i, (sensor, cell))| {
-                        reading(*sensor, *cell, instant.said.get(i).copied().unwrap_or_default())
+                        reading(*sensor, *cell, instant.qualifiers.get(i).copied().unwrap_or_default())
                     })
                     .collect(),
             })

@@ -26,7 +26,7 @@ pub(super) fn height_found(
     for instant in &first {
         for (i, (sensor, range)) in instant.reports.iter().enumerate() {
             let name = &names[*sensor];
-            let is_limit = instant.said.get(i).is_some_and(|said| said.limit.is_some());
+            let is_limit = instant.qualifiers.get(i).is_some_and(|one| one.limit.is_some());
             let is_known = anchors.iter().any(|(known, _)| known == name);
             if let Some(range) = range
                 .filter(|range| range.is_finite() && (*range >= 0.0 || options.unknown_clock) && !is_limit && is_known)

@@ -7,6 +7,7 @@
 //! By chance that share is then at most .06. Repetitions say nothing new: taken for measurements, they make bands too narrow.
 
 use super::instant::Instant;
+use fewbits_numerics::Runs;
 use std::collections::VecDeque;
 
 /// Least share of the values that equal the one before, and number of different values that are repeated.
@@ -15,15 +16,13 @@ const DIFFERENT: usize = 10;
 /// Largest of the smallest change, in medians of the changes.
 const FINE: f64 = 0.2;
 /// A longer run than so many of the longest among the first rows is no longer left out: the sensor may be stuck.
-const LONGER: usize = 3;
+const LONGER: u32 = 3;
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Column {
     /// Longest run that is left out; 0 if the column does not hold its values.
-    longest: usize,
-    last: Option<f64>,
-    /// Repetitions of the last value.
-    run: usize,
+    longest: u32,
+    runs: Runs,
 }
 
 /// Leaves repetitions out of rows.
@@ -31,25 +30,23 @@ struct Column {
 pub(super) struct Held(Vec<Column>);
 
 /// Longest run of repetitions in values, if they are held.
-fn held(values: &[f64]) -> Option<usize> {
-    let (mut equal, mut run, mut longest) = (0_usize, 0, 0);
+fn held(values: &[f64]) -> Option<u32> {
+    let (mut runs, mut longest) = (Runs::default(), 0);
     let (mut changes, mut repeated) = (Vec::new(), Vec::new());
-    for pair in values.windows(2) {
-        if pair[0] == pair[1] {
-            (equal, run) = (equal + 1, run + 1);
-            longest = longest.max(run);
-            if run == 1 {
-                repeated.push(pair[0]);
-            }
-        } else {
-            run = 0;
-            changes.push((pair[1] - pair[0]).abs());
+    for value in values {
+        let last = runs.add(*value);
+        longest = longest.max(runs.repetitions);
+        match runs.repetitions {
+            0 => changes.extend(last.map(|last| (value - last).abs())),
+            1 => repeated.push(*value),
+            _ => {}
         }
     }
+    let equal = runs.equal.saturating_add(runs.repetitions);
     changes.sort_by(f64::total_cmp);
     repeated.sort_by(f64::total_cmp);
     repeated.dedup();
-    let is_often = equal as f64 >= OFTEN * values.len() as f64 && repeated.len() >= DIFFERENT;
+    let is_often = f64::from(equal) >= OFTEN * values.len() as f64 && repeated.len() >= DIFFERENT;
     let is_fine = changes.first()? <= &(FINE * changes[changes.len() / 2]);
     (is_often && is_fine).then_some(longest)
 }
@@ -88,14 +85,17 @@ impl Held {
                 stays.push(true);
                 continue;
             };
-            let is_repeated = cell.is_some() && *cell == column.last;
-            column.run = if is_repeated { column.run + 1 } else { 0 };
-            column.last = cell.or(column.last);
-            stays.push(!is_repeated || column.run > column.longest);
+            match cell {
+                Some(value) => _ = column.runs.add(*value),
+                None => column.runs.repetitions = 0,
+            }
+            let repetitions = column.runs.repetitions;
+            stays.push(repetitions == 0 || repetitions > column.longest);
         }
         let mut of_reports = stays.iter();
         row.reports.retain(|_| of_reports.next().is_none_or(|stays| *stays));
-        let mut of_said = stays.iter();
-        row.said.retain(|_| of_said.next().is_none_or(|stays| *stays));
+        let mut of_qualifiers = stays.iter();
+        row.qualifiers
+            .retain(|_| of_qualifiers.next().is_none_or(|stays| *stays));
     }
 }

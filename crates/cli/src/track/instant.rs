@@ -5,9 +5,9 @@ use fewbits_table::Side;
 /// Index of each sensor, and what it reported; `None` if the cell is empty.
 pub(super) type Reports = Vec<(usize, Option<f64>)>;
 
-/// What a row says of its own reports.
+/// What a row states about one of its reports.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Said {
+pub(super) struct Qualifier {
     pub(super) accuracy: Option<f64>,
     pub(super) threshold: Option<f64>,
     /// It is a limit, as `<0.25`: the side on which the measurement is.
@@ -27,6 +27,6 @@ pub(super) struct Instant {
     pub(super) is_row: bool,
     /// Index of each sensor, and what it reported; `None` if the cell is empty.
     pub(super) reports: Reports,
-    /// What the rows of these reports say of them, as many.
-    pub(super) said: Vec<Said>,
+    /// One per report.
+    pub(super) qualifiers: Vec<Qualifier>,
 }

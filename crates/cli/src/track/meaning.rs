@@ -1,6 +1,6 @@
 //! A sensor's seat, and what the cells of its column mean.
 
-use super::instant::Said;
+use super::instant::Qualifier;
 use crate::error::Error;
 use crate::numbers::above_zero;
 use crate::report::Report;
@@ -78,7 +78,7 @@ impl Seat {
     }
 
     /// What a cell of its column says; `None` if nothing.
-    pub(super) fn reading(&self, cell: Option<f64>, said: Said, last: Option<f64>) -> Option<StatedReading> {
+    pub(super) fn reading(&self, cell: Option<f64>, qualifier: Qualifier, last: Option<f64>) -> Option<StatedReading> {
         let Some(value) = cell else {
             let (last, within) = (last?, self.meaning.silent_within?);
             return Some(StatedReading {
@@ -87,7 +87,10 @@ impl Seat {
                 deviation: self.noise,
             });
         };
-        let deviation = said.accuracy.filter(|accuracy| *accuracy > 0.0).unwrap_or(self.noise);
+        let deviation = qualifier
+            .accuracy
+            .filter(|accuracy| *accuracy > 0.0)
+            .unwrap_or(self.noise);
         let mut reading = match self.meaning.step {
             Some(step) => StatedReading::rounded(value, step, deviation),
             None => StatedReading::value(value, deviation),
@@ -99,7 +102,7 @@ impl Seat {
         if let Some(most) = most.map(|most| most - self.offset).filter(|most| value >= *most) {
             (reading.lower, reading.upper) = (most, f64::INFINITY);
         }
-        match said.limit {
+        match qualifier.limit {
             Some(Side::Below) => (reading.lower, reading.upper) = (f64::NEG_INFINITY, value),
             Some(Side::Above) => (reading.lower, reading.upper) = (value, f64::INFINITY),
             None => {}

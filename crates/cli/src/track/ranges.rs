@@ -199,7 +199,7 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
             found = moved.map_err(|source| refused_row(&instants, &instant, source))?;
         }
         for (i, (sensor, range)) in instant.reports.iter().enumerate() {
-            let is_limit = instant.said.get(i).is_some_and(|said| said.limit.is_some());
+            let is_limit = instant.qualifiers.get(i).is_some_and(|one| one.limit.is_some());
             let Some(range) = range.filter(|range| range.is_finite() && !is_limit) else {
                 continue;
             };

@@ -3,7 +3,7 @@
 use super::applied::Correction;
 use super::columns::{Kind, Roles};
 use super::held::Held;
-use super::instant::{Instant, Reports, Said};
+use super::instant::{Instant, Qualifier, Reports};
 use super::late::Late;
 use super::samples::Samples;
 use crate::arguments::TableOptions;
@@ -228,7 +228,7 @@ impl Instants {
                         self.copies += 1;
                     } else {
                         instant.reports.extend(row.reports);
-                        instant.said.extend(row.said);
+                        instant.qualifiers.extend(row.qualifiers);
                     }
                 }
                 row => {
@@ -241,7 +241,7 @@ impl Instants {
             for sensor in 0..self.names.len() {
                 if instant.reports.iter().all(|(other, _)| *other != sensor) {
                     instant.reports.push((sensor, None));
-                    instant.said.push(Said::default());
+                    instant.qualifiers.push(Qualifier::default());
                 }
             }
         }
@@ -354,7 +354,7 @@ impl Instants {
                 }
             }
         }
-        let said = |place: &usize| Said {
+        let qualifier = |place: &usize| Qualifier {
             accuracy: own[0],
             threshold: own[1],
             limit: self.table.limit(*place).filter(|_| self.has_limits),
@@ -364,7 +364,7 @@ impl Instants {
             time,
             row: self.table.row(),
             is_row: true,
-            said: places.iter().map(said).collect(),
+            qualifiers: places.iter().map(qualifier).collect(),
             reports,
         }))
     }

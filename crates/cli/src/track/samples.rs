@@ -1,6 +1,6 @@
 //! Measurements of sensors that send on change: those that they did not send, at times without a row.
 
-use super::instant::{Instant, Said};
+use super::instant::{Instant, Qualifier};
 use std::collections::VecDeque;
 
 /// Times nearer than this share of the interval are equal.
@@ -61,7 +61,7 @@ impl Samples {
             {
                 Some(before) => {
                     before.reports.push((sensor, None));
-                    before.said.push(Said::default());
+                    before.qualifiers.push(Qualifier::default());
                 }
                 None => self.ready.push_back(Instant {
                     seconds,
@@ -69,13 +69,13 @@ impl Samples {
                     row: row.row,
                     is_row: false,
                     reports: vec![(sensor, None)],
-                    said: vec![Said::default()],
+                    qualifiers: vec![Qualifier::default()],
                 }),
             }
         }
         // An empty cell where another sensor reports is a measurement only if it is time for one.
-        let (mut reports, mut said) = (Vec::new(), Vec::new());
-        for (report, own) in row.reports.iter().zip(&row.said) {
+        let (mut reports, mut qualifiers) = (Vec::new(), Vec::new());
+        for (report, own) in row.reports.iter().zip(&row.qualifiers) {
             let last = &mut self.last[report.0];
             let is_due = |last: f64| {
                 let apart = (row.seconds - last) / self.interval;
@@ -84,10 +84,10 @@ impl Samples {
             if report.1.is_some() || last.is_some_and(is_due) {
                 *last = Some(row.seconds);
                 reports.push(*report);
-                said.push(*own);
+                qualifiers.push(*own);
             }
         }
-        (row.reports, row.said) = (reports, said);
+        (row.reports, row.qualifiers) = (reports, qualifiers);
         self.ready.push_back(row);
     }
 }

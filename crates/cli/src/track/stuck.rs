@@ -1,37 +1,29 @@
 //! Sensors that repeat one value to its last digit, though their values hardly ever did so before.
 
 use super::instant::Instant;
+use fewbits_numerics::Runs;
 
 /// Equal values in a row from which a sensor is told to be stuck, and others before it, at least.
-const LONG: usize = 30;
+const LONG: u32 = 30;
 /// Share of values before it that may equal the one before them.
 const SELDOM: f64 = 0.05;
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Repeats {
-    last: Option<f64>,
-    /// Values so far; those that equal the one before them, outside the present run.
-    count: usize,
-    equal: usize,
-    run: usize,
+    runs: Runs,
     /// The value of the longest run of one that is stuck, and its length.
-    stuck: Option<(f64, usize)>,
+    stuck: Option<(f64, u32)>,
 }
 
 impl Repeats {
     fn add(&mut self, value: f64) {
-        self.count += 1;
-        if self.last == Some(value) {
-            self.run += 1;
-            let before = self.count - self.run;
-            let is_seldom = before >= LONG && self.equal as f64 <= SELDOM * before as f64;
-            let is_longest = self.stuck.is_none_or(|(_, longest)| self.run > longest);
-            if self.run >= LONG && is_seldom && is_longest {
-                self.stuck = Some((value, self.run));
-            }
-        } else {
-            self.equal += self.run.saturating_sub(1);
-            (self.last, self.run) = (Some(value), 1);
+        self.runs.add(value);
+        let Runs { pairs, equal, .. } = self.runs;
+        let run = self.runs.repetitions.saturating_add(1);
+        let is_seldom = pairs >= LONG && f64::from(equal) <= SELDOM * f64::from(pairs);
+        let is_longest = self.stuck.is_none_or(|(_, longest)| run > longest);
+        if run >= LONG && is_seldom && is_longest {
+            self.stuck = Some((value, run));
         }
     }
 }

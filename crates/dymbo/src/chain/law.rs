@@ -69,7 +69,7 @@ impl MessageLaw {
     ///
     /// # Errors
     /// Never for a filter that its constructors made.
-    pub fn count(filter: &ParallelFilter, predicted_variance: f64) -> Result<Self, Error> {
+    pub(crate) fn count(filter: &ParallelFilter, predicted_variance: f64) -> Result<Self, Error> {
         let (sensors, arriving) = (filter.sensors(), Link::flipping(filter.link().crossover())?);
         let scheme = SignBit::of(filter.plant());
         let factor = |bit: Sign| scheme.factor(&0.0, &Observation::Received(bit), &arriving);
@@ -88,7 +88,7 @@ impl MessageLaw {
     ///
     /// # Errors
     /// If `sensors` is zero or above 12: the number of bit strings doubles with each sensor.
-    pub fn sequence(plant: &ScalarPlant, predicted_variance: f64, sensors: usize) -> Result<Self, Error> {
+    pub(crate) fn sequence(plant: &ScalarPlant, predicted_variance: f64, sensors: usize) -> Result<Self, Error> {
         within("sensors", sensors as f64, 1.0, MAX_SEQUENCE as f64)?;
         let (scheme, r) = (SignBit::of(plant), plant.measurement_variance());
         let mut law = Self::empty();

@@ -84,14 +84,14 @@ impl Reading {
 
     /// What it says of a measurement, under a prediction of this mean and variance without noise: the density or probability, mean and
     /// variance of the measurement afterwards in the prediction's deviations, noise included, and that variance.
-    pub(crate) fn said(&self, mean: f64, variance: f64, noise: f64, period: Option<f64>) -> Option<Said> {
+    pub(crate) fn said(&self, mean: f64, variance: f64, noise: f64, period: Option<f64>) -> Option<ReadingMoments> {
         match *self {
             Self::Value { value, deviation } => {
                 let noise = deviation.unwrap_or(noise);
                 let variance = variance + noise * noise;
                 let score = wrapped(value - mean, period) / variance.sqrt();
                 let density = (-0.5 * score * score).exp() / (std::f64::consts::TAU * variance).sqrt();
-                Some(Said {
+                Some(ReadingMoments {
                     density,
                     score,
                     left: 0.0,
@@ -110,7 +110,7 @@ impl Reading {
                     _ => -mean,
                 };
                 let found = truncated_moments((lower + shift) / deviation, (upper + shift) / deviation).ok()?;
-                Some(Said {
+                Some(ReadingMoments {
                     density: found.log_probability.exp(),
                     score: found.mean,
                     left: found.variance,
@@ -148,7 +148,7 @@ impl Reading {
 }
 
 /// Moments of a measurement given a reading of it.
-pub(crate) struct Said {
+pub(crate) struct ReadingMoments {
     /// Its density or probability.
     pub(crate) density: f64,
     /// Mean of the innovation afterwards, and its variance, in the prediction's deviations.

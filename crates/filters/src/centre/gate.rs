@@ -50,7 +50,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// ```
     pub(super) fn gate(&self, law: &Law<D>, predicted: &Gaussian<D>, readings: &[Reading<'_, D>]) -> Vec<Verdict> {
         let state = |reading: &Reading<'_, D>| &self.members[reading.seat].state;
-        let first = |reading: &Reading<'_, D>| match (&reading.likelihood, state(reading).is_out()) {
+        let first = |reading: &Reading<'_, D>| match (&reading.likelihood, state(reading).is_ignored()) {
             (None, _) => Fate::Rejected,
             (_, true) if self.health == Health::Exclude => Fate::Excluded,
             _ => Fate::Used,
@@ -153,7 +153,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// Words are not compared.
     fn follows_its_last(&self, reading: &Reading<'_, D>, predicted: &Gaussian<D>) -> bool {
         let member = &self.members[reading.seat];
-        if reading.content != Content::Report || member.state.is_out() {
+        if reading.content != Content::Report || member.state.is_ignored() {
             return true;
         }
         let (Some((value, noise)), Some(spread)) =
@@ -188,7 +188,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             here.map(|(_, verdict)| verdict.fate == Fate::Rejected)
         };
         let in_use = self.members.iter().enumerate();
-        let in_use = in_use.filter(|(_, member)| !member.state.is_out() && !member.state.presence.named_dead);
+        let in_use = in_use.filter(|(_, member)| !member.state.is_ignored() && !member.state.presence.named_dead);
         let (all, astray) = in_use.fold((0, 0), |(all, astray), (seat, member)| {
             let is_astray = now(seat).unwrap_or(member.state.astray > 0);
             (all + 1, astray + usize::from(is_astray))

@@ -211,7 +211,7 @@ impl Default for FalseAlarms {
 impl FalseAlarms {
     /// A report is rejected if the probability of reports that are at most as likely is below this: ten times the rate of false alarms of
     /// a sensor, and at most 0.01. The loss of one report costs less than that of a sensor.
-    pub fn gate(&self) -> f64 {
+    pub(crate) fn gate(&self) -> f64 {
         (10.0 * self.sensor).min(0.01)
     }
 
@@ -311,8 +311,8 @@ pub enum Health {
     Off,
     /// Reports are tested and events are returned. All reports are used, except those that cannot be.
     Report,
-    /// Reports that are too unlikely given the prediction and the others' are not used ([`FalseAlarms::gate`]); sensors that contradict the
-    /// others again and again are excluded.
+    /// Reports that are too unlikely given the prediction and the others' are not used: less likely than ten times the rate of false alarms of a
+    /// sensor, and at most 0.01. Sensors that contradict the others again and again are excluded.
     #[default]
     Exclude,
 }

@@ -200,7 +200,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// Decides about a sensor that repeats one value: it is stuck if another still moves.
     fn hold(&mut self, seat: usize, events: &mut Vec<Event>) {
         let is_moving = |(other, member): &(usize, &super::Member<D>)| {
-            *other != seat && !member.state.presence.named_dead && member.state.repeats.run == 0
+            *other != seat && !member.state.presence.named_dead && member.state.repeats.runs.repetitions == 0
         };
         let moving = self.members.iter().enumerate().filter(is_moving);
         let moving: Vec<(usize, bool)> = moving.map(|(other, member)| (other, member.state.excluded)).collect();
@@ -231,18 +231,20 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// suspect, both are in dispute: their reports contradict each other, and nothing says which is wrong.
     fn exclude(&mut self, seat: usize, fate: Fate, events: &mut Vec<Event>) {
         let own = self.members[seat].state;
-        let excluded = self.members.iter().filter(|member| member.state.is_out()).count();
+        let excluded = self.members.iter().filter(|member| member.state.is_ignored()).count();
         // The prediction may be what is wrong, until the others have spoken. They speak from the first rejected report on, or from the next
         // report on. There is no rival to a report that is impossible.
         let is_against = self.rival.and_then(|rival| rival.is_against(self.members[seat].number));
         let is_early = self.health == Health::Exclude && !is_against.unwrap_or(fate == Fate::Rejected);
-        if own.is_out() || is_early || self.health == Health::Off {
+        if own.is_ignored() || is_early || self.health == Health::Off {
             return;
         }
         let suspicion = |state: &super::state::MemberState| state.monitor.contradiction(&self.limits.sensor);
         let others = || {
             let all = self.members.iter().enumerate();
-            all.filter(|(other, member)| *other != seat && !member.state.is_out() && !member.state.presence.named_dead)
+            all.filter(|(other, member)| {
+                *other != seat && !member.state.is_ignored() && !member.state.presence.named_dead
+            })
         };
         let is_alone = others().all(|(_, member)| suspicion(&member.state) < SUSPECT);
         let deepest = others()

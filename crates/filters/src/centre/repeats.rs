@@ -9,6 +9,7 @@
 //! Values that are rounded coarsely repeat while the level rests, however often they changed before. So only a sensor is judged whose values moved by
 //! less than a quarter of its noise at least once: rounding to such steps is less than one part in 190 of the noise's variance.
 
+use fewbits_numerics::Runs;
 use serde::{Deserialize, Serialize};
 
 /// Fewest repetitions in a row.
@@ -23,18 +24,13 @@ const AGREES: f64 = 19.5;
 
 /// The values of one sensor, as far as they repeat.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub(super) struct Repeats {
-    #[serde(default, with = "fewbits_numerics::stored")]
-    last: Option<f64>,
+    #[serde(flatten)]
+    pub runs: Runs,
     /// Smallest difference of two successive values that is not zero.
     #[serde(with = "fewbits_numerics::stored")]
     step: f64,
-    /// Pairs of successive values before the present run, and how many of them are equal.
-    pairs: u32,
-    equal: u32,
-    /// Number of values that repeat the one before them since the last other value, and `ln` of the probability of so many.
-    pub run: u32,
+    /// `ln` of the probability of the repetitions in the present run.
     #[serde(with = "fewbits_numerics::stored")]
     log_probability: f64,
     pub is_stuck: bool,
@@ -54,11 +50,8 @@ pub(super) enum Repeated {
 impl Repeats {
     pub(crate) fn new() -> Self {
         Self {
-            last: None,
+            runs: Runs::default(),
             step: f64::INFINITY,
-            pairs: 0,
-            equal: 0,
-            run: 0,
             log_probability: 0.0,
             is_stuck: false,
         }
@@ -67,37 +60,39 @@ impl Repeats {
     /// Whether a value agrees with the one before it, whose difference has this variance. A repetition of a sensor that hardly ever repeats itself does
     /// not: wild values are often all the same.
     pub(crate) fn agrees(&self, value: f64, variance: f64) -> bool {
-        let Some(last) = self.last else { return true };
-        let is_repeated = last == value && f64::from(self.equal) <= SELDOM * f64::from(self.pairs) && self.pairs > 0;
+        let Some(last) = self.runs.last else { return true };
+        let is_repeated = last == value && self.is_seldom() && self.runs.pairs > 0;
         !is_repeated && (value - last).powi(2) <= AGREES * variance
+    }
+
+    fn is_seldom(&self) -> bool {
+        f64::from(self.runs.equal) <= SELDOM * f64::from(self.runs.pairs)
     }
 
     /// Adds a value, of noise of this variance. `rate`: of false alarms.
     pub(crate) fn add(&mut self, value: f64, variance: f64, rate: f64) -> Repeated {
-        let last = self.last.replace(value);
-        if last == Some(value) {
-            let before = f64::from(self.run);
-            let share = (f64::from(self.equal) + 0.5 + before) / (f64::from(self.pairs) + 1.0 + before);
+        if self.runs.last == Some(value) {
+            let before = f64::from(self.runs.repetitions);
+            let share = (f64::from(self.runs.equal) + 0.5 + before) / (f64::from(self.runs.pairs) + 1.0 + before);
             self.log_probability += share.ln();
-            self.run = self.run.saturating_add(1);
-            let is_seldom = f64::from(self.equal) <= SELDOM * f64::from(self.pairs);
+            self.runs.add(value);
             let is_fine = self.step <= FINE * variance.sqrt();
-            let is_improbable = self.run >= FEWEST && self.log_probability < rate.ln();
-            return if is_improbable && is_seldom && is_fine {
+            let is_improbable = self.runs.repetitions >= FEWEST && self.log_probability < rate.ln();
+            return if is_improbable && self.is_seldom() && is_fine {
                 Repeated::Suspect
             } else {
                 Repeated::Usual
             };
         }
         let was_stuck = std::mem::take(&mut self.is_stuck);
-        if let Some(last) = last {
-            self.step = self.step.min((value - last).abs());
+        if was_stuck {
             // Values of a sensor that was stuck say nothing about the others.
-            let run = if was_stuck { 0 } else { self.run };
-            self.pairs = self.pairs.saturating_add(run).saturating_add(1);
-            self.equal = self.equal.saturating_add(run);
+            self.runs.repetitions = 0;
         }
-        (self.run, self.log_probability) = (0, 0.0);
+        if let Some(last) = self.runs.add(value) {
+            self.step = self.step.min((value - last).abs());
+        }
+        self.log_probability = 0.0;
         if was_stuck {
             Repeated::MovesAgain
         } else {
@@ -109,6 +104,7 @@ impl Repeats {
 #[cfg(test)]
 mod tests {
     use super::{Repeated, Repeats};
+    use fewbits_numerics::Runs;
 
     /// Number of repetitions after which a sensor of these values is suspect.
     fn found_after(values: &[f64], variance: f64, most: usize) -> Option<usize> {
@@ -128,6 +124,28 @@ mod tests {
         // Of 19 pairs: 1.3e-6 after six, 3.2e-7 after seven.
         assert_eq!(found_after(&moving(20), 1.0, 20), Some(7));
         assert_eq!(found_after(&[1.0], 1.0, 1000), None);
+    }
+
+    #[test]
+    fn flat_stored_fields_are_restored() {
+        let text = r#"{"last":1.5,"step":"inf","pairs":9,"equal":1,"run":3,"log_probability":-4.0,"is_stuck":false}"#;
+        let stored: Repeats = serde_json::from_str(text).unwrap();
+        let runs = Runs {
+            last: Some(1.5),
+            pairs: 9,
+            equal: 1,
+            repetitions: 3,
+        };
+        let expected = Repeats {
+            runs,
+            step: f64::INFINITY,
+            log_probability: -4.0,
+            is_stuck: false,
+        };
+        assert_eq!(stored, expected);
+        let mut bytes = Vec::new();
+        ciborium::into_writer(&expected, &mut bytes).unwrap();
+        assert_eq!(ciborium::from_reader::<Repeats, _>(&bytes[..]).unwrap(), expected);
     }
 
     #[test]

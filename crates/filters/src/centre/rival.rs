@@ -78,7 +78,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         let is_open = |rival: &&Rival<D>| {
             let state = self.member(rival.sensor).ok().map(|member| member.state);
             let mut own = judged.iter().filter(|(reading, _)| number(reading) == rival.sensor);
-            state.is_some_and(|state| !state.is_out() && !state.presence.named_dead) && own.all(is_suspect)
+            state.is_some_and(|state| !state.is_ignored() && !state.presence.named_dead) && own.all(is_suspect)
         };
         let last = self.rival.as_ref().filter(is_open);
         let own = |rival: &Rival<D>| judged.iter().find(|(reading, _)| number(reading) == rival.sensor);

@@ -61,8 +61,8 @@ impl MemberState {
         }
     }
 
-    /// Whether its reports are not used from now on: it contradicts the others, or is stuck.
-    pub(crate) fn is_out(&self) -> bool {
+    /// Whether its next reports are not used: it contradicts the others, or is stuck.
+    pub(crate) fn is_ignored(&self) -> bool {
         self.excluded || self.repeats.is_stuck
     }
 

@@ -115,7 +115,7 @@ pub fn cubature<const D: usize>(p: &KernelEstimate<D>, q: &Mixture<D>, rule: Cub
 
 /// The cubature points of an estimate and its log densities there, computed once to compare many approximations with it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct CubatureTarget<const D: usize> {
+pub(crate) struct CubatureTarget<const D: usize> {
     columns: [Vec<f64>; D],
     weights: Vec<f64>,
     log_density: Vec<f64>,
@@ -123,7 +123,7 @@ pub struct CubatureTarget<const D: usize> {
 
 impl<const D: usize> CubatureTarget<D> {
     /// All points of all kernels of positive weight. Evaluates `n` kernels per point.
-    pub fn new(estimate: &KernelEstimate<D>, rule: Cubature) -> Self {
+    pub(crate) fn new(estimate: &KernelEstimate<D>, rule: Cubature) -> Self {
         let weights = estimate.particles().weights();
         let centres = estimate.particles().columns();
         let kept: Vec<usize> = (0..weights.len()).filter(|i| weights[*i] > 0.0).collect();
@@ -146,7 +146,7 @@ impl<const D: usize> CubatureTarget<D> {
     }
 
     /// Plug-in errors of one approximation.
-    pub fn plug_in(&self, q: &Mixture<D>) -> PlugIn {
+    pub(crate) fn plug_in(&self, q: &Mixture<D>) -> PlugIn {
         let mut other = vec![0.0; self.weights.len()];
         q.log_pdf_columns(self.columns.each_ref().map(Vec::as_slice), &mut other);
         PlugIn::of((0..other.len()).map(|i| (self.weights[i], self.log_density[i] - other[i])))

@@ -247,7 +247,7 @@ fn counted_tails(sharpness: &Eight, [edge, side, scale]: [f32; 3], x: &Eight, w:
 
 /// Predictions of the bank for the next slot.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ahead {
+pub(crate) struct Ahead {
     pub(super) slots: u32,
     /// Mean of the bank, in steps from the last index.
     pub(super) mean: f32,

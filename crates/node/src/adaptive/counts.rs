@@ -18,7 +18,7 @@ fn half_to(power: i64) -> f32 {
 
 /// How often each residual `k != 0` occurred. Old occurrences lose weight.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Residuals {
+pub(crate) struct Residuals {
     counts: [u16; COUNTS],
     total: u32,
 }
@@ -100,7 +100,7 @@ const LOWEST: i64 = -(1 << 40);
 /// An index and its count share a word of 64 bits, with the index in the higher bits. The table takes 1,920 bytes, and words are in the
 /// order of their indices.
 #[derive(Debug, Clone)]
-pub struct Values {
+pub(crate) struct Values {
     entries: [u64; CAPACITY],
     len: usize,
     total: u32,

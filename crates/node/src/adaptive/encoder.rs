@@ -77,11 +77,6 @@ impl Encoder {
         Ok(encoder)
     }
 
-    /// The configuration that the receiver has too.
-    pub fn config(&self) -> &Config {
-        &self.config
-    }
-
     /// The state of a receiver that lost nothing; `None` before the first sample.
     pub fn replica(&self) -> Option<&Replica> {
         self.started.then_some(&self.replica)
@@ -180,13 +175,6 @@ impl Encoder {
             None => self.replica.silent(&slot),
         }
         Ok(Some(written))
-    }
-
-    /// The replica one slot after the last sample, and that slot; `None` before the first sample.
-    pub fn ahead(&self, elapsed: u32) -> Option<(Replica, Slot)> {
-        let mut replica = self.replica()?.clone();
-        let slot = replica.predict(elapsed);
-        Some((replica, slot))
     }
 
     /// The sample, checked and reduced to the circle if there is one.

@@ -137,7 +137,7 @@ impl Lattice {
     }
 
     /// Distance of two values, around the circle if there is one.
-    pub fn distance(&self, a: f64, b: f64) -> f64 {
+    fn distance(&self, a: f64, b: f64) -> f64 {
         let straight = (a - b).abs();
         self.circle
             .map_or(straight, |(period, _)| straight.min((period - straight).abs()))

@@ -21,9 +21,8 @@ mod steady;
 mod stored;
 
 pub use crate::packet::{TENS, push_number};
-pub use bank::{Ahead, Bank};
+pub use bank::Bank;
 pub use config::Config;
-pub use counts::{Residuals, Values};
 pub use encoder::{Encoder, MODEL_BITS, Report, is_scheduled, next_sequence};
 pub use family::{MODELS, SCALES};
 pub use lattice::Lattice;

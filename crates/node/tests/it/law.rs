@@ -16,7 +16,8 @@ fn every_symbol_is_found_where_it_lies() {
             if n % 60 != 59 {
                 continue;
             }
-            let (replica, slot) = encoder.ahead(1).unwrap();
+            let mut replica = encoder.replica().unwrap().clone();
+            let slot = replica.predict(1);
             let law = replica.law(&slot);
             let mut end = 0;
             for symbol in 0..=ESCAPE {

@@ -123,7 +123,7 @@ pub fn log_interval(a: f64, b: f64) -> f64 {
 
 /// As [`log_interval`], with the same bits. Precondition: `b - a` is at least [`WIDE`] before rounding; skips the series for narrow cells.
 #[inline(always)]
-pub fn log_interval_wide(a: f64, b: f64) -> f64 {
+pub(crate) fn log_interval_wide(a: f64, b: f64) -> f64 {
     log_interval_of::<true, false>(a, b)
 }
 
@@ -143,7 +143,7 @@ pub fn interval(a: f64, b: f64) -> f64 {
 
 /// As [`interval`], with the same bits. Precondition: `b - a` is at least [`WIDE`] before rounding; skips the series for narrow cells.
 #[inline(always)]
-pub fn interval_wide(a: f64, b: f64) -> f64 {
+pub(crate) fn interval_wide(a: f64, b: f64) -> f64 {
     interval_of::<true, false>(a, b)
 }
 

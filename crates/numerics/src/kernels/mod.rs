@@ -57,12 +57,12 @@ pub use reduce::{
 /// For single calls use [`normal`](crate::normal), which has functions of the same names and results.
 pub mod scalar {
     #[cfg(feature = "std")]
-    pub use super::cell::{WIDE, interval, interval_wide, log_interval, log_interval_wide};
+    pub use super::cell::{WIDE, interval, log_interval};
     pub use super::elementary::{exp, ln};
     #[cfg(feature = "std")]
     pub use super::power_of_half::power_of_half;
     #[cfg(feature = "std")]
-    pub use super::tail::{cdf, erfcx, inverse_mills, log_cdf, pdf};
+    pub use super::tail::{cdf, erfcx, log_cdf, pdf};
 }
 
 /// Runs `work`, compiled for the widest vector instructions of this machine, and returns its result.
@@ -114,7 +114,7 @@ macro_rules! over_cells {
         pub fn $name(lower: &mut [f64], upper: &[f64]) {
             vectorised(#[inline(always)] || {
                 for (lower, upper) in lower.iter_mut().zip(upper) {
-                    *lower = scalar::$name(*lower, *upper);
+                    *lower = cell::$name(*lower, *upper);
                 }
             });
         }

@@ -120,9 +120,3 @@ pub fn cdf(x: f64) -> f64 {
 pub fn log_cdf(x: f64) -> f64 {
     cut(x).log_cdf(x)
 }
-
-/// `phi(x) / Phi(x)`: within eight units in the last place.
-#[inline(always)]
-pub fn inverse_mills(x: f64) -> f64 {
-    cut(x).inverse_mills(x)
-}

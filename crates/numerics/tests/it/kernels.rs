@@ -145,7 +145,6 @@ elementwise!(Pdf, |x, _| scalar::pdf(x));
 elementwise!(Erfcx, |x, _| scalar::erfcx(x));
 elementwise!(Cdf, |x, _| scalar::cdf(x));
 elementwise!(LogCdf, |x, _| scalar::log_cdf(x));
-elementwise!(InverseMills, |x, _| scalar::inverse_mills(x));
 elementwise!(Interval, scalar::interval);
 elementwise!(LogInterval, scalar::log_interval);
 
@@ -190,7 +189,6 @@ fn every_width_gives_the_same_bits_and_so_do_scalars() {
         Erfcx: |x, _| normal::erfcx(x),
         Cdf: |x, _| normal::cdf(x),
         LogCdf: |x, _| normal::log_cdf(x),
-        InverseMills: |x, _| normal::inverse_mills(x),
         Interval: normal::interval,
         LogInterval: normal::log_interval,
     }

@@ -1,7 +1,7 @@
 //! A designed quantizer with its reconstruction values.
 
 use crate::error::{Error, refuse};
-use crate::quantizer::{Quantizer, cell_of, check_increasing};
+use crate::quantizer::{Quantizer, check_increasing};
 use fewbits_numerics::error::{all_finite, finite, non_negative, positive, probabilities};
 use serde::{Deserialize, Serialize};
 
@@ -88,16 +88,6 @@ impl LloydMax {
         self.mean_squared_error
     }
 
-    /// Entropy of the cell index in bits: the mean length with an ideal entropy coder.
-    pub fn entropy_bits(&self) -> f64 {
-        -self
-            .probabilities
-            .iter()
-            .filter(|p| **p > 0.0)
-            .map(|p| p * p.log2())
-            .sum::<f64>()
-    }
-
     /// The quantizer of `mean + deviation X`, where this one is the quantizer of `X`.
     ///
     /// # Errors
@@ -117,15 +107,6 @@ impl LloydMax {
             probabilities: self.probabilities.clone(),
             mean_squared_error: deviation * (deviation * self.mean_squared_error),
         })
-    }
-
-    /// Index of the cell that contains `x`, 0 to `levels - 1`: the number of breakpoints at or below `x`.
-    ///
-    /// # Errors
-    /// If `x` is NaN.
-    #[inline]
-    pub fn encode(&self, x: f64) -> Result<usize, Error> {
-        cell_of(&self.breakpoints, x)
     }
 }
 

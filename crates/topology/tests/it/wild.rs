@@ -26,7 +26,7 @@ proptest! {
                 prop_assert!(deployment.nearest_to(&Vector2::new(x[5], x[6])) < deployment.len());
             }
             if let Ok(graph) = Graph::within(deployment.positions(), x[7]) {
-                prop_assert!(graph.components().largest_share() <= 1.0);
+                prop_assert_eq!(graph.components().sizes.iter().sum::<usize>(), deployment.len());
                 if let Ok(hops) = graph.hops_from(node) {
                     let _ = (hops.route(counts[0]), hops.distance(node), hops.parent(counts[1]));
                 }
