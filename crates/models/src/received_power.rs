@@ -106,7 +106,7 @@ impl<const D: usize> ReceivedPower<D> {
     }
 
     /// Noise variance `r`.
-    fn noise_variance(&self) -> f64 {
+    pub fn noise_variance(&self) -> f64 {
         self.noise_covariance[0]
     }
 

@@ -89,6 +89,14 @@ impl Air {
         })
     }
 
+    /// The same air with another wind, m/s.
+    ///
+    /// # Errors
+    /// As [`Air::new`].
+    pub fn with_wind(&self, wind: Vector3<f64>) -> Result<Self, Error> {
+        Self::new(self.diffusivity, wind, self.ground)?.with_closest(self.closest)
+    }
+
     /// The same air with another diffusivity, m^2/s.
     fn with_diffusivity(&self, diffusivity: f64) -> Result<Self, Error> {
         Self::new(diffusivity, self.wind, self.ground)?.with_closest(self.closest)
@@ -97,6 +105,11 @@ impl Air {
     /// Wind, m/s.
     pub fn wind(&self) -> &Vector3<f64> {
         &self.wind
+    }
+
+    /// The shortest distance, m; shorter ones are replaced by it.
+    pub fn closest(&self) -> f64 {
+        self.closest
     }
 
     /// Sign of the image source below the ground; `None` over permeable ground, where there is no image.

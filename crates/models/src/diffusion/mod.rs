@@ -1,5 +1,5 @@
-//! How a substance released into air or water spreads: Green's functions of the diffusion equation, and
-//! concentrations from a source that releases at a constant rate.
+//! How a substance released into air or water spreads: Green's functions of the diffusion equation, and concentrations
+//! from sources that vary, move or cover an area.
 //!
 //! The equation is `dc/dt = kappa lap c - v . grad c + release` (Zhao and Nehorai, IEEE Trans. Signal Processing 55 (2007)
 //! 2729, section II). Units are SI: metres, seconds, kilograms, kg/m^3. Any other consistent set works too.
@@ -9,7 +9,8 @@
 //! | one coordinate, unbounded or with one wall | [`Axis`] |
 //! | three dimensions with wind | [`Space`] |
 //! | a source that releases at a constant rate, closed form, with gradient | [`Air`] |
-//! | the region where the concentration exceeds a threshold | [`contour_radius`] |
+//! | a release that lasts, varies, moves, covers a disk | [`Release`], [`moving_source`], [`disk_source`] |
+//! | the region where the concentration exceeds a threshold | [`contour_radius`], [`contour`] |
 //! | a table of the response, for many distances | [`Profile`] |
 //!
 //! Rooms, slabs, vessels and media of varying diffusivity have no closed form, or one for each shape. The crate
@@ -33,15 +34,19 @@
 mod air;
 mod axis;
 mod contour;
+mod extended;
 mod half_space;
 mod integrate;
 mod profile;
+mod release;
 mod space;
 
 pub use crate::source_model::SourceGradient;
 pub use air::{Air, Ground};
 pub use axis::Axis;
-pub use contour::contour_radius;
+pub use contour::{contour, contour_radius};
+pub use extended::{disk_source, moving_source};
 pub use half_space::{Flux, Wall};
 pub use profile::Profile;
+pub use release::Release;
 pub use space::{ImpulseResponse, Space, step_response};

@@ -1,8 +1,8 @@
 //! Reference values of the diffusion physics, computed by an independent program.
 
 use crate::diffusion_entries::{beginning_with, number};
-use fewbits_models::diffusion::{Air, Axis, Flux, Ground, Wall, contour_radius};
-use nalgebra::Vector3;
+use fewbits_models::diffusion::{Air, Axis, Flux, Ground, Release, Wall, contour_radius, disk_source, moving_source};
+use nalgebra::{Vector2, Vector3};
 use serde_json::Value;
 
 fn entries(prefix: &str) -> Vec<Value> {
@@ -50,10 +50,9 @@ fn continuous_source() {
 fn finite_release() {
     for e in entries("cont_finite") {
         let air = Air::new(number(&e, "kappa"), Vector3::zeros(), Ground::Impermeable).unwrap();
+        let release = Release::during(number(&e, "t_on"), number(&e, "t_off"), 1.0).unwrap();
         let (r, r0) = (vector(&e, "r"), vector(&e, "r0"));
-        // A release that ended is one that goes on less one that began at its end.
-        let since = |instant: &str| air.concentration(&r, &r0, number(&e, "t") - number(&e, instant));
-        check(&e, since("t_on") - since("t_off"));
+        check(&e, release.concentration(number(&e, "t"), |age| air.concentration(&r, &r0, age)));
     }
 }
 
@@ -64,6 +63,21 @@ fn permeable_ground() {
         let air = Air::new(number(&e, "kappa"), Vector3::zeros(), Ground::Wall(wall)).unwrap();
         let r = Vector3::new(number(&e, "rho2").sqrt(), 0.0, number(&e, "z"));
         check(&e, air.concentration(&r, &Vector3::new(0.0, 0.0, number(&e, "z0")), number(&e, "t")));
+    }
+}
+
+#[test]
+fn moving_and_distributed_sources() {
+    for e in entries("moving") {
+        let air = Air::new(number(&e, "kappa"), Vector3::zeros(), Ground::Impermeable).unwrap();
+        let (r, p, u) = (vector(&e, "r"), vector(&e, "p0"), vector(&e, "u"));
+        check(&e, moving_source(&air, &r, &p, &u, number(&e, "t")).unwrap());
+    }
+    for e in entries("disk") {
+        let air = Air::new(number(&e, "kappa"), Vector3::zeros(), Ground::Impermeable).unwrap();
+        let centre = Vector2::from_fn(|i, _| e["inputs"]["centre"][i].as_f64().unwrap());
+        let (r, radius) = (vector(&e, "r"), number(&e, "R"));
+        check(&e, disk_source(&air, &r, (centre, 0.0), radius, number(&e, "t"), 16).unwrap());
     }
 }
 

@@ -1,9 +1,11 @@
-//! Sources over every ground: gradients, closest distances, contours and tables.
+//! Sources over every ground: gradients, closest distances, releases in time, contours and tables.
 
 use fewbits_models::diffusion::{
-    Air, Axis, Flux, Ground, ImpulseResponse, Profile, Space, Wall, contour_radius, step_response,
+    Air, Axis, Flux, Ground, ImpulseResponse, Profile, Release, Space, Wall, contour, contour_radius, disk_source,
+    moving_source, step_response,
 };
-use nalgebra::Vector3;
+use fewbits_numerics::quadrature::Rule;
+use nalgebra::{Vector2, Vector3};
 use std::cell::Cell;
 use std::f64::consts::{PI, TAU};
 
@@ -79,7 +81,9 @@ fn the_pole_is_cut_off_along_the_ray() {
     let ray = Vector3::new(0.48, 0.6, -0.64);
     for wind in [Vector3::zeros(), Vector3::new(7.0, -3.0, 2.0)] {
         let air = Air::new(1.4, wind, Ground::None).unwrap();
+        assert_eq!((air.closest(), air.wind()), (1e-3, &wind));
         let air = air.with_closest(0.2).unwrap();
+        assert_eq!(air.closest(), 0.2);
         let edge = air.concentration(&(ray * 0.2), &Vector3::zeros(), 3.0);
         close(air.concentration(&(ray * 0.05), &Vector3::zeros(), 3.0), edge, 1e-13);
         assert!(air.concentration(&(ray * 0.21), &Vector3::zeros(), 3.0) < edge);
@@ -103,8 +107,9 @@ fn the_pole_is_cut_off_along_the_ray() {
 #[test]
 fn axes_and_spaces_say_what_they_are() {
     let windy = |v| Axis::open(1.4).unwrap().with_wind(v, Flux::Total).unwrap();
+    assert_eq!((windy(0.7).wind(), windy(0.7).diffusivity()), (0.7, 1.4));
     let space = Space::new([windy(0.7), windy(-0.2), Axis::half_space(1.4, Wall::ABSORBING).unwrap()]).unwrap();
-    assert_eq!(space.diffusivity(), 1.4);
+    assert_eq!((space.wind(), space.diffusivity()), (Vector3::new(0.7, -0.2, 0.0), 1.4));
     assert!(Space::new([windy(0.7), windy(0.7), Axis::open(1.5).unwrap()]).is_err());
     assert!(windy(0.7).with_wind(f64::NAN, Flux::Total).is_err());
     // A Gaussian that the wind carries.
@@ -114,8 +119,107 @@ fn axes_and_spaces_say_what_they_are() {
     assert_eq!(windy(0.7).green(x, 0.4, 0.0), 0.0);
 }
 
+/// A varying rate is its first value, and every later change from its own instant on.
 #[test]
-fn contour_radius_is_where_the_closed_form_equals_the_threshold() {
+fn a_varying_rate_is_a_sum_of_steps() {
+    for distance in [0.3, 2.9] {
+        let air = Air::new(1.4, Vector3::new(0.8, 0.1, 0.0), Ground::None).unwrap();
+        let (field, source) = (Vector3::new(distance, 0.0, 0.0), Vector3::zeros());
+        let step = |age: f64| air.concentration(&field, &source, age);
+        let (start, time) = (3.1, 9.7);
+        let rate = |t: f64| 1.7 + 0.4 * t - 0.03 * t * t;
+        let changes = Rule::gauss_legendre(40).composite(start, time, 200, |t| (0.4 - 0.06 * t) * step(time - t));
+        let want = rate(start) * step(time - start) + changes;
+        let calls = Cell::new(0);
+        let impulse = |age: f64| {
+            calls.set(calls.get() + 1);
+            air.green(&field, &source, age)
+        };
+        let got = Release::varying(rate, start, time, (1.4, distance), impulse).unwrap();
+        close(got, want, 1e-10);
+        assert!(calls.get() <= 1000, "{} evaluations", calls.get());
+        let at = |start, time| Release::varying(rate, start, time, (1.4, distance), impulse).unwrap();
+        assert_eq!([at(3.1, 3.1), at(3.1, 2.0), at(3.1, 3.1 + 1e-9)], [0.0; 3]);
+        assert!(Release::varying(rate, start, time, (0.0, distance), impulse).is_err());
+        assert!(Release::varying(rate, start, time, (1.4, -distance), impulse).is_err());
+        // A rate that is not a number is no reason to look for ever.
+        calls.set(0);
+        assert!(
+            Release::varying(|_| f64::NAN, start, time, (1.4, distance), impulse)
+                .unwrap()
+                .is_nan()
+        );
+        assert!(calls.get() <= 1000, "{} evaluations", calls.get());
+    }
+}
+
+#[test]
+fn piecewise_rates_are_boxes() {
+    let growth = |age: f64| age * age;
+    let release = Release::piecewise(vec![1.0, 2.5, 4.0, f64::INFINITY], vec![0.7, 0.0, 1.9]).unwrap();
+    for (time, want) in [
+        (0.5, 0.0),
+        (1.0, 0.0),
+        (1.9, 0.7 * 0.81),
+        (3.0, 0.7 * (4.0 - 0.25)),
+        (5.0, 0.7 * (16.0 - 6.25) + 1.9),
+    ] {
+        assert!((release.concentration(time, growth) - want).abs() < 1e-13, "{time}");
+    }
+    let from = Release::from(0.3, 2.0).unwrap();
+    assert!((from.concentration(1.5, growth) - 2.0 * 1.44).abs() < 1e-14);
+    // What falls with the age would leave less than nothing.
+    let during = Release::during(0.3, 0.9, 2.0).unwrap();
+    assert_eq!(during.concentration(1.5, |age| -age), 0.0);
+    for (edges, rates) in [
+        (vec![1.0, 1.0], vec![1.0]),
+        (vec![2.0, 1.0], vec![1.0]),
+        (vec![f64::NEG_INFINITY, 1.0], vec![1.0]),
+        (vec![f64::NAN, 1.0], vec![1.0]),
+        (vec![1.0, 2.0], vec![-0.1]),
+        (vec![1.0, 2.0], vec![f64::INFINITY]),
+        (vec![1.0, 2.0], vec![1.0, 1.0]),
+        (vec![1.0], vec![]),
+        (vec![], vec![]),
+    ] {
+        assert!(Release::piecewise(edges.clone(), rates.clone()).is_err(), "{edges:?} {rates:?}");
+    }
+}
+
+#[test]
+fn contours_start_downwind_and_turn_evenly() {
+    let source = Vector2::new(6.2, -5.0);
+    for (wind, downwind) in [
+        (Vector3::new(-2.0, 1.5, 0.0), 1.5_f64.atan2(-2.0)),
+        (Vector3::zeros(), 0.0),
+    ] {
+        let air = Air::new(4.0, wind, Ground::Impermeable).unwrap();
+        let points = contour(&air, &source, 1.3, 1e-3, 60.0, 7).unwrap();
+        assert_eq!(points.len(), 7);
+        for (i, point) in points.iter().enumerate() {
+            let offset = point - source;
+            let turned = offset.y.atan2(offset.x) - downwind - TAU * i as f64 / 7.0;
+            assert!((turned - TAU * (turned / TAU).round()).abs() < 1e-12, "{i}");
+            let place = |p: &Vector2<f64>| Vector3::new(p.x, p.y, 0.0);
+            close(1.3 * air.concentration(&place(point), &place(&source), 60.0), 1e-3, 1e-12);
+        }
+        // Nowhere reached, or not yet.
+        assert!(
+            contour(&air, &source, 1.3, 1e9, 60.0, 3)
+                .unwrap()
+                .iter()
+                .all(|point| *point == source)
+        );
+        assert!(
+            contour(&air, &source, 1.3, 1e-3, 0.0, 3)
+                .unwrap()
+                .iter()
+                .all(|point| *point == source)
+        );
+        for (rate, threshold, directions) in [(0.0, 1e-3, 3), (1.3, 0.0, 3), (1.3, 1e-3, 0)] {
+            assert!(contour(&air, &source, rate, threshold, 60.0, directions).is_err());
+        }
+    }
     for (rate, threshold, age, diffusivity) in [(1.3, 1e-3, 60.0, 4.0), (0.7, 2e3, 5.0, 0.3), (1e-9, 1e-3, 1e12, 4.0)] {
         let radius = contour_radius(rate, threshold, age, diffusivity).unwrap();
         let there = rate * libm::erfc(radius / (4.0 * diffusivity * age).sqrt()) / (TAU * diffusivity * radius);
@@ -145,4 +249,59 @@ fn tables_end_where_they_should() {
     Profile::new(5.3, 0.4, counted).unwrap();
     assert_eq!(calls.get(), 10 * 14);
     assert!(Profile::new(5.3, 0.0, f).is_err() && Profile::new(5.3, 1.0, |_| [f64::INFINITY]).is_err());
+}
+
+/// A moving source in its own frame, and as the integral over what it left behind.
+#[test]
+fn a_moving_source_leaves_its_trail() {
+    let wind = Vector3::new(0.5, -0.3, 0.0);
+    let air = Air::new(1.4, wind, Ground::Impermeable).unwrap();
+    let (field, start, velocity) =
+        (Vector3::new(3.1, 1.2, 0.9), Vector3::new(0.2, -0.4, 0.3), Vector3::new(0.9, 0.4, 0.0));
+    let age = 2.6;
+    let got = moving_source(&air, &field, &start, &velocity, age).unwrap();
+    let trail =
+        Rule::gauss_legendre(40).composite(0.0, age, 30, |t| air.green(&field, &(start + velocity * t), age - t));
+    close(got, trail, 1e-9);
+    assert!(moving_source(&air, &field, &start, &Vector3::z(), age).is_err());
+    assert!(moving_source(&air, &field, &start, &Vector3::repeat(f64::NAN), age).is_err());
+}
+
+/// Over any ground, and none: the integral over what was left behind.
+#[test]
+fn moving_source_keeps_the_airs_ground() {
+    let (field, start, velocity) =
+        (Vector3::new(3.1, 1.2, 0.9), Vector3::new(0.2, -0.4, 0.3), Vector3::new(0.9, 0.4, 0.0));
+    let age = 2.6;
+    let leaking = Ground::Wall(Wall::permeable(0.7).unwrap());
+    for ground in [
+        Ground::None,
+        Ground::Impermeable,
+        Ground::Wall(Wall::ABSORBING),
+        leaking,
+    ] {
+        let air = Air::new(1.4, Vector3::new(0.5, -0.3, 0.0), ground).unwrap();
+        let got = moving_source(&air, &field, &start, &velocity, age).unwrap();
+        let trail =
+            Rule::gauss_legendre(40).composite(0.0, age, 30, |t| air.green(&field, &(start + velocity * t), age - t));
+        close(got, trail, 1e-9);
+    }
+}
+
+/// The mean over the disk, by brute force in Cartesian coordinates.
+#[test]
+fn a_disk_is_the_mean_of_its_points() {
+    let air = Air::new(1.4, Vector3::new(0.5, -0.3, 0.0), Ground::Impermeable).unwrap();
+    let (field, centre, height, radius) = (Vector3::new(3.1, 1.2, 0.9), Vector2::new(0.2, -0.4), 0.3, 0.8);
+    let rule = Rule::gauss_legendre(24);
+    // x = radius sin(s) takes the square root out of the ends.
+    let mean = rule.sum(-0.5 * PI, 0.5 * PI, |s| {
+        let half = radius * s.cos();
+        half * rule.sum(-half, half, |y| {
+            air.concentration(&field, &Vector3::new(centre.x + radius * s.sin(), centre.y + y, height), 2.0)
+        })
+    }) / (PI * radius * radius);
+    close(disk_source(&air, &field, (centre, height), radius, 2.0, 16).unwrap(), mean, 1e-9);
+    assert!(disk_source(&air, &field, (centre, height), 0.0, 2.0, 16).is_err());
+    assert!(disk_source(&air, &field, (centre, height), radius, 2.0, 0).is_err());
 }
