@@ -27,10 +27,8 @@ pub enum Weighing {
 
 /// Send if and only if `nu' S^-1 nu >= eta`, with the innovation `nu = z - prediction`.
 ///
-/// For scalar measurements this rule is equivalent to one that sends if the posterior's Kullback-Leibler divergence is large. With noise
-/// variance `r`, innovation variance `s` and `q = nu^2/s`, the divergence from prior to posterior is `1/2 [(s/r - 1)(1 + q) - ln(s/r)]`
-/// and the other `1/2 [ln(s/r) - (1 - r/s) + (1 - r/s) q]`, whose mean is the mutual information `1/2 ln(s/r)`. Both increase with `q`.
-/// For vector measurements the rules differ: the divergence weighs the innovation by `S^-1 (S - R) R^-1`.
+/// For scalar measurements this rule is equivalent to one that sends if the posterior's Kullback-Leibler divergence is large; see
+/// [`information`](crate::information).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Ellipsoid<M>", into = "Ellipsoid<M>")]
 pub struct CensoringRule<const M: usize> {

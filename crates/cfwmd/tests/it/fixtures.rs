@@ -4,6 +4,7 @@ use crate::Silence;
 use fewbits_baselines::cfwmd::cross_covariance_step;
 use fewbits_baselines::cfwmd::trigger::StochasticTrigger;
 use fewbits_cfwmd::ellipsoid::Ellipsoid;
+use fewbits_cfwmd::information::{Direction, divergence};
 use fewbits_cfwmd::rule::{OwnRecursion, OwnStep};
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::{Factor, Gaussian};
@@ -158,16 +159,13 @@ fn compute(name: &str, inputs: &Value) -> Option<Vec<f64>> {
                 c[(1, 1)],
             ]
         }
-        "kl" => {
-            let prior = Gaussian::scalar(0.0, number("s") - number("r")).unwrap();
-            let sensor = LinearSensor::direct(number("r")).unwrap();
-            let posterior = kalman::update(&sensor, &prior, &[number("nu")].into()).unwrap().0;
-            let divergences = [
-                prior.kl_divergence(&posterior).unwrap(),
-                posterior.kl_divergence(&prior).unwrap(),
-            ];
-            vec![divergences[0], divergences[1], divergences[0] + divergences[1]]
-        }
+        "kl" => [
+            Direction::PriorToPosterior,
+            Direction::PosteriorToPrior,
+            Direction::Symmetric,
+        ]
+        .map(|direction| divergence(direction, number("nu"), number("s"), number("r")).unwrap())
+        .to_vec(),
         "field" => {
             let position = Vector2::new(number("sx"), number("sy"));
             let sensor =
