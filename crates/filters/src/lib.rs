@@ -15,7 +15,7 @@
 //! | several models, one at a time | [`Imm`] (interacting multiple models) | [`Switching`] (their dynamics) |
 //! | the exact answer for a scalar | [`PointMassFilter`]: on a fixed grid with any dynamics, on one that follows the belief with linear ones | [`TransitionKernel`] (its time update) |
 //! | the exact answer for a few numbers | | [`LatticeKernel`] (independent noise on each) |
-//! | smoothing | | [`smoother`] (Gaussian beliefs: Rauch-Tung-Striebel), [`TransitionKernel::smooth`] (a grid) |
+//! | smoothing | | [`smoother`] (Gaussian beliefs: Rauch-Tung-Striebel), [`backward_simulation`] (particles), [`TransitionKernel::smooth`] (a grid) |
 //! | calibration of sensors and level from recorded readings | [`fit`] (maximum likelihood), [`calibration`] (noises and change alone) | |
 //! | the steady state | [`scalar_steady_state`] (closed form, any message quality), [`steady_state`] (doubling) | |
 //! | a bound for all of them | [`cramer_rao`] (posterior Cramer-Rao recursions) | |
@@ -36,6 +36,7 @@
 //!
 //! Not in this crate: the scheme of any single paper, and time-varying models (pass another model at each step).
 
+mod backward_simulation;
 pub mod calibration;
 pub mod centre;
 pub mod contract;
@@ -60,6 +61,7 @@ mod steady_state;
 mod switching;
 mod transition_kernel;
 
+pub use backward_simulation::backward_simulation;
 pub use contract::{Info, MomentFilter, Points, StateFilter};
 pub use ensemble::EnsembleFilter;
 pub use fewbits_core::Error;

@@ -37,6 +37,11 @@ impl Constant {
             probability: link.delivery(observation),
         }
     }
+
+    /// The probability of the observation.
+    pub fn probability(&self) -> f64 {
+        self.probability
+    }
 }
 
 impl<const M: usize> Factor<M> for Constant {

@@ -3,6 +3,7 @@
 // Helpers fail loudly, as tests do.
 #![allow(clippy::unwrap_used)]
 
+mod backward_simulation;
 mod calibration;
 mod centre;
 mod contract;
