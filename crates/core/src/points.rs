@@ -74,7 +74,7 @@ fn move_all<const D: usize>(
 ///
 /// # Errors
 /// [`Error::NotANumber`] if a moved point is not finite; the points are then unchanged.
-pub fn transport<const D: usize>(
+pub(crate) fn transport<const D: usize>(
     mut states: ColumnsMut<'_, D>,
     from: &Gaussian<D>,
     to: &Gaussian<D>,
@@ -124,29 +124,7 @@ pub(crate) fn move_points<const D: usize, const M: usize>(
 ///
 /// # Errors
 /// [`Error::Impossible`] if the observation has probability zero; [`Error::NotANumber`] if a number overflows or is NaN; if there is not
-<<<<<<< HEAD
 /// one weight and one measurement per point. The points are then unchanged.
-=======
-/// one weight per point. The points are then unchanged.
-pub fn move_points<const D: usize, const M: usize>(
-    mut states: ColumnsMut<'_, D>,
-    weights: &[f64],
-    observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
-) -> Result<(f64, SVector<f64, M>), Error> {
-    check(&mut states, weights)?;
-    let mut measured: [Vec<f64>; M] = std::array::from_fn(|_| vec![0.0; weights.len()]);
-    let shared: Columns<'_, D> = states.each_ref().map(|column| &**column);
-    observed
-        .sensing
-        .mean_columns(&shared, measured.each_mut().map(Vec::as_mut_slice));
-    move_measured_points(states, weights, &measured.each_ref().map(Vec::as_slice), &observed.factor)
-}
-
-/// As [`move_points`], with the noise-free measurements of the points, which the caller has computed.
-///
-/// # Errors
-/// As [`move_points`], or if there is not one measurement per point.
->>>>>>> parent of 485c31b7 (core: the factor of outliers, which nobody used, and accessors of one caller go)
 pub fn move_measured_points<const D: usize, const M: usize>(
     mut states: ColumnsMut<'_, D>,
     weights: &[f64],
