@@ -346,3 +346,14 @@ fn commands_take_what_other_commands_took() {
     good(path, &["pack", "leap.csv", "--time", "±1s", "--append", "-o", "leap.fewb"], b"");
     assert_eq!(text(&good(path, &["unpack", "leap.fewb"], b"")).lines().count(), 7);
 }
+
+#[test]
+fn verify_names_the_option_of_gaps() {
+    let folder = folder(&[("s.csv", "time,a\n1,5.5\n2,-9999\n")]);
+    let folder = folder.path();
+    good(folder, &["pack", "s.csv", "--time", "exact", "--missing", "-9999", "-o", "s.fewb"], b"");
+    let output = fewbits(folder, &["verify", "s.csv", "s.fewb"], b"");
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stdout).contains("--missing, as for pack"), "{}", text(&output.stdout));
+    good(folder, &["verify", "s.csv", "s.fewb", "--missing", "-9999"], b"");
+}
