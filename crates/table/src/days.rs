@@ -38,7 +38,8 @@ fn are_minutes(names: &[&str], cells: &[&str]) -> bool {
     let name = name.to_lowercase();
     let is_said = ["m:s", "min:s"].iter().any(|words| {
         let at = name.find(words);
-        at.is_some_and(|at| !name[..at].trim_end_matches('m').ends_with(':'))
+        let before = at.map(|at| name[..at].trim_end_matches('m'));
+        before.is_some_and(|before| before.is_empty() || before.ends_with(['(', '[', ' ']))
     });
     is_said && cells.iter().all(|cell| cell.matches(':').count() == 1)
 }

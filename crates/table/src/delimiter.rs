@@ -31,6 +31,8 @@ pub(crate) fn names_its_rows(lines: &[&str], split: Split) -> bool {
     !others.is_empty()
         && lines.iter().all(|line| line.as_bytes().first() == Some(&split.quote))
         && others.iter().all(|line| width(line) == count)
+        // Numbers stand without quotes, or all cells have them.
+        && others.iter().any(|line| line.bytes().filter(|c| *c == split.quote).count() < 2 * count)
 }
 
 /// Largest number of titles above names that are aligned by spaces.

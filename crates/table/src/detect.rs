@@ -314,7 +314,7 @@ fn layout(
             dialect.skip = Some(lines_before(rows[header].0));
             let mut found = from_header(rows, header, dialect);
             if let (Some((_, names)), Some((_, above))) = (&mut found.names, header.checked_sub(1).map(|i| &rows[i])) {
-                take_names_above(names, above, comma);
+                take_names_above(names, above, filled(&rows[data].1), comma);
             }
             Ok(found)
         }
@@ -326,8 +326,12 @@ fn layout(
 }
 
 /// Names of the line above for columns that have none in the last one, which names the columns of an index alone.
-fn take_names_above(names: &mut [String], above: &[String], comma: bool) {
+/// `width`: number of cells of a row.
+fn take_names_above(names: &mut [String], above: &[String], width: usize, comma: bool) {
     let count = filled(names);
+    if width <= count {
+        return;
+    }
     let is_index = count > 0 && names[..count].iter().all(|name| !name.is_empty());
     let others = above.get(count..names.len()).unwrap_or_default();
     if is_index && !others.is_empty() && others.iter().all(|name| look(name, comma) == Look::Text) {

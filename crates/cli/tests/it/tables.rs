@@ -357,3 +357,15 @@ fn verify_names_the_option_of_gaps() {
     assert!(text(&output.stdout).contains("--missing, as for pack"), "{}", text(&output.stdout));
     good(folder, &["verify", "s.csv", "s.fewb", "--missing", "-9999"], b"");
 }
+
+#[test]
+fn look_names_columns_of_text_that_are_no_words() {
+    let row = |i: usize| format!("{i},{}{i},\"+{i},1\",{}\n", "long ".repeat(6), i % 9);
+    let table = (0..300).fold("time,note,code,x\n".to_owned(), |text, i| text + &row(i % 60));
+    let codes = (0..300).fold("time,code\n".to_owned(), |text, i| text + &format!("{i},\"+{i},1\"\n"));
+    let folder = folder(&[("s.csv", &table), ("t.csv", &codes)]);
+    let shown = text(&good(folder.path(), &["look", "t.csv"], b""));
+    assert!(shown.contains("all of its cells: if it is text, say --without code"), "{shown}");
+    let shown = text(&good(folder.path(), &["look", "s.csv"], b""));
+    assert!(shown.contains("too long for a recording, say --without note"), "{shown}");
+}

@@ -76,6 +76,7 @@ fn names_tell_minutes_from_hours() {
     for (name, expected) in [
         ("Time (mm:ss)", "62"),
         ("Elapsed [m:ss]", "62"),
+        ("Item:size", "3720"),
         ("Time (hh:mm)", "3720"),
         ("Time [hh:mm:ss]", "3720"),
         ("time", "3720"),
@@ -144,6 +145,15 @@ fn names_of_rows_and_of_an_index() {
     let table = open(",room,room\nsensor,a,b\ntime,,\n2024-03-05 09:58:00,1.5,2\n2024-03-05 09:59:00,1.6,3\n");
     let names: Vec<&str> = table.columns().iter().map(|column| column.name.as_str()).collect();
     assert_eq!(names, ["time", "a", "b"]);
+    // An empty cell behind the last name is no column, whatever the title has there.
+    assert_eq!(
+        open("Report,Plant A,North\ntime,temp,\n1,2.5,\n2,2.6,\n")
+            .columns()
+            .len(),
+        2
+    );
+    // Where all cells have quotes, the one too many may be the last.
+    assert!(refusal(&mut open("\"time\",\"temp\"\n\"0\",\"1\",\"2\"\n")).contains("3 cells instead of 2"));
 }
 
 #[test]
