@@ -152,7 +152,7 @@ impl Error {
         Self::NoColumn {
             file: file.to_owned(),
             column: column.to_owned(),
-            existing: existing.join(", "),
+            existing: fewbits_recipes::names::shown(existing),
         }
     }
 

@@ -1,12 +1,15 @@
 //! Rows of a source that goes on: read by a thread of its own, written out before a deadline, at an error and at a signal.
 //!
 //! Rows that were read are never lost to what follows them. If a line is refused, or a signal asks the command to end, the rows before
-//! are written out first.
+//! are written out first. If they do not fit the storage, it is said how many do.
 
 use crate::error::Error;
 use crate::input::{Row, Table};
+use crate::say::say;
 use crate::{interrupt, target};
-use fewbits_record::TimeBase;
+use fewbits_record::{Recorder, Schema, TimeBase};
+use std::fs::File;
+use std::io::{Seek, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
@@ -127,4 +130,134 @@ pub(crate) fn run(
         }),
         (None, flushed) => flushed.map(|()| Ended { rows, error: None }),
     }
+}
+
+/// The row of a live table: its tick, and its cells.
+type Taken = (Option<i64>, Vec<Option<f64>>);
+
+/// Rows into a recording.
+struct Recording<W> {
+    recorder: Recorder<W>,
+    waiting: usize,
+    taken: u64,
+    /// Rows of those that are written.
+    written: u64,
+    /// Whether the rows before the first block are kept.
+    keeps: bool,
+    kept: Vec<Taken>,
+    file: String,
+}
+
+impl<W: Write> RowSink for Recording<W> {
+    fn push(&mut self, tick: Option<i64>, cells: &[Option<f64>]) -> Result<(), Error> {
+        if self.keeps {
+            self.kept.push((tick, cells.to_vec()));
+        }
+        self.taken += 1;
+        let before = self.recorder.bytes();
+        push(&mut self.recorder, tick, cells).map_err(Error::recording(&self.file))?;
+        if self.recorder.bytes() > before {
+            // The first block is written when the row behind it comes.
+            self.written = self.taken - u64::from(before == 0);
+            // Behind a block at most this row waits.
+            self.waiting = 1;
+            (self.keeps, self.kept) = (false, Vec::new());
+        } else {
+            self.waiting += 1;
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<(), Error> {
+        self.recorder.flush().map_err(Error::recording(&self.file))?;
+        (self.waiting, self.written) = (0, self.taken);
+        if self.recorder.bytes() > 0 {
+            (self.keeps, self.kept) = (false, Vec::new());
+        }
+        Ok(())
+    }
+
+    fn waiting(&self) -> usize {
+        self.waiting
+    }
+}
+
+fn push<W: Write>(
+    recorder: &mut Recorder<W>,
+    tick: Option<i64>,
+    cells: &[Option<f64>],
+) -> Result<(), fewbits_record::Error> {
+    match tick {
+        Some(tick) => recorder.push(tick, cells),
+        None => recorder.push_next(cells),
+    }
+}
+
+/// Packs all rows and finishes the recording. All rows before an error of the table are kept, and the error comes second. If nothing but the
+/// first block did not fit the storage, as many of its rows as do are written to `spare`, a handle of the same file.
+pub(crate) fn fill<W: Write>(
+    table: Table,
+    recorder: Recorder<W>,
+    deadline: Option<Duration>,
+    spare: Option<File>,
+    file: &str,
+) -> Result<(W, u64, Option<Error>), Error> {
+    let schema = recorder.schema().clone();
+    let mut recording = Recording {
+        recorder,
+        waiting: 0,
+        taken: 0,
+        written: 0,
+        keeps: spare.is_some(),
+        kept: Vec::new(),
+        file: file.to_owned(),
+    };
+    let ended = run(table, schema.time(), deadline, &mut recording);
+    let Recording {
+        recorder,
+        taken,
+        written,
+        kept,
+        ..
+    } = recording;
+    let error = match ended {
+        Ok(Ended {
+            rows: 0,
+            error: Some(error),
+        }) => return Err(error),
+        Ok(Ended { rows, error }) => match recorder.finish() {
+            Ok(sink) => return Ok((sink, rows, error)),
+            Err(second) => error.unwrap_or_else(|| Error::recording(file)(second)),
+        },
+        Err(error) => error,
+    };
+    let written = match spare {
+        Some(spare) if !kept.is_empty() => salvage(spare, &schema, &kept) as u64,
+        _ => written,
+    };
+    say!(
+        "{file}: {written} of {taken} rows are in it, the others did not fit: make room; with --rows-per-block or --deadline fewer rows wait to \
+         be written"
+    );
+    Err(error)
+}
+
+/// Writes half of the rows, or half of that and so on, until they fit. Returns how many.
+fn salvage(spare: File, schema: &Schema, rows: &[Taken]) -> usize {
+    let write = |count: usize| -> Result<(), Box<dyn std::error::Error>> {
+        let mut file = spare.try_clone()?;
+        file.set_len(0)?;
+        file.rewind()?;
+        let mut recorder = Recorder::new(file, schema.clone());
+        for (tick, cells) in &rows[..count] {
+            push(&mut recorder, *tick, cells)?;
+        }
+        recorder.finish()?;
+        Ok(())
+    };
+    let mut count = rows.len() / 2;
+    while count > 0 && write(count).is_err() {
+        count /= 2;
+    }
+    count
 }

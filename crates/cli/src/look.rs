@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::numbers::exact;
 use crate::{Ending, opening, output, say};
 use fewbits_recipes::look::{Look, Number, look};
-use fewbits_table::{Kind, Scale};
+use fewbits_table::{Kind, Scale, names};
 use std::fmt::Write;
 use std::ops::ControlFlow;
 
@@ -115,6 +115,9 @@ fn text(look: &Look) -> String {
                     .collect();
                 let more = if column.words.len() > SHOWN { ", ..." } else { "" };
                 let _ = write!(text, " ({}{more})", words.join(", "));
+                if column.kind == Kind::Words && fewbits_recipes::words::unit(&column.words).is_empty() {
+                    let _ = write!(text, "; too long for a recording, say --without {}", names::quoted(&name));
+                }
             }
             _ => {}
         }
@@ -134,6 +137,9 @@ fn text(look: &Look) -> String {
                 "  suspicious: {} cells that are no {}, first at {first}",
                 column.suspicious, column.kind
             );
+            if column.suspicious == column.values {
+                let _ = writeln!(text, "  all of its cells: if it is text, say --without {}", names::quoted(&name));
+            }
         }
         if let Some(value) = column.sentinel {
             let _ = writeln!(

@@ -60,6 +60,7 @@ use clap::Parser;
 use error::Error;
 use say::say;
 use std::error::Error as _;
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 /// The end of a task that was not refused.
@@ -120,8 +121,26 @@ fn run(mut task: Task) -> Result<Ending, Error> {
     }
 }
 
+/// The words of the command without an output `-`, which is standard output, as if none were named.
+fn words() -> Vec<OsString> {
+    let (mut kept, mut words) = (Vec::new(), std::env::args_os().peekable());
+    while let Some(word) = words.next() {
+        let is_output = word == "-o" || word == "--output";
+        if word == "--" {
+            kept.push(word);
+            kept.extend(words);
+            break;
+        } else if is_output && words.peek().is_some_and(|next| next == "-") {
+            words.next();
+        } else if word != "-o-" && word != "--output=-" {
+            kept.push(word);
+        }
+    }
+    kept
+}
+
 fn main() -> ExitCode {
-    match run(Cli::parse().task) {
+    match run(Cli::parse_from(words()).task) {
         Ok(Ending::Good) => ExitCode::SUCCESS,
         Ok(Ending::Failed) => ExitCode::FAILURE,
         Ok(Ending::Refused) => ExitCode::from(2),

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::files::is_regular;
 use crate::identity::Identity;
 use crate::input::{Survey, Table};
-use crate::live::{self, RowSink};
+use crate::live;
 use crate::rows::TableRows;
 use crate::say::say;
 use crate::single_pass::{is_written_beside, readable_once};
@@ -159,63 +159,19 @@ fn warn_of_few(file: &str, schema: &Schema, survey: &Survey) {
     }
 }
 
-/// Rows into a recording.
-struct Recording<W> {
-    recorder: Recorder<W>,
-    waiting: usize,
-    file: String,
-}
-
-impl<W: Write> RowSink for Recording<W> {
-    fn push(&mut self, tick: Option<i64>, cells: &[Option<f64>]) -> Result<(), Error> {
-        let before = self.recorder.bytes();
-        let pushed = match tick {
-            Some(tick) => self.recorder.push(tick, cells),
-            None => self.recorder.push_next(cells),
-        };
-        pushed.map_err(Error::recording(&self.file))?;
-        // Behind a block at most this row waits.
-        self.waiting = if self.recorder.bytes() > before {
-            1
-        } else {
-            self.waiting + 1
-        };
-        Ok(())
-    }
-
-    fn flush(&mut self) -> Result<(), Error> {
-        self.waiting = 0;
-        self.recorder.flush().map_err(Error::recording(&self.file))
-    }
-
-    fn waiting(&self) -> usize {
-        self.waiting
-    }
-}
-
-/// Packs all rows of the table and finishes the recording. Of a live table all rows before an error are kept, and the error comes second.
+/// Packs all rows of the table and finishes the recording. Of a live table all rows before an error are kept, and the error comes second;
+/// `spare`: a handle of the same file.
 fn fill<W: Write>(
     table: Table,
     recorder: Recorder<W>,
     options: &PackOptions,
+    spare: Option<File>,
     file: &str,
 ) -> Result<(W, u64, Option<Error>), Error> {
-    let time = recorder.schema().time();
     if target::is_live() {
-        let mut recording = Recording {
-            recorder,
-            waiting: 0,
-            file: file.to_owned(),
-        };
-        let ended = live::run(table, time, options.deadline, &mut recording)?;
-        if ended.rows == 0
-            && let Some(error) = ended.error
-        {
-            return Err(error);
-        }
-        let sink = recording.recorder.finish().map_err(Error::recording(file))?;
-        return Ok((sink, ended.rows, ended.error));
+        return live::fill(table, recorder, options.deadline, spare, file);
     }
+    let time = recorder.schema().time();
     let (mut rows, mut recorder) = (TableRows::new(table, time), recorder);
     let mut go = |_| ControlFlow::Continue(());
     let count = fewbits_recipes::pack::fill(&mut rows, &mut recorder, &mut go).map_err(Error::recipe(file))?;
@@ -286,7 +242,7 @@ fn appended(
 ) -> Result<(Done, Option<Error>), Error> {
     // The old index was removed and counts as written anew.
     let (schema, before) = (recorder.schema().clone(), recorder.bytes());
-    let (mut sink, rows, error) = fill(table, recorder, options, file)?;
+    let (mut sink, rows, error) = fill(table, recorder, options, None, file)?;
     let bytes = size_of(&mut sink).map_err(Error::recording(file))?;
     Ok((Done::of(rows, bytes.saturating_sub(before), &schema), error))
 }
@@ -314,7 +270,7 @@ fn created(
     schema: Schema,
 ) -> Result<(Done, Option<Error>), Error> {
     let sink = Target::open_binary(options.output.as_deref())?;
-    let file = sink.name().to_owned();
+    let (file, spare) = (sink.name().to_owned(), sink.spare());
     let mut recorder = Recorder::new(Counted { sink, bytes: 0 }, schema.clone()).with_effort(effort);
     if is_regular(&options.table.file) {
         let file = &options.table.file;
@@ -325,7 +281,7 @@ fn created(
             .map_err(Error::io(file, "read"))?;
         recorder = recorder.with_identity(identity);
     }
-    let (counted, rows, error) = fill(table, recorder, options, &file)?;
+    let (counted, rows, error) = fill(table, recorder, options, spare, &file)?;
     if error.is_none() {
         counted.sink.finish()?;
     }

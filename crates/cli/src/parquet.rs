@@ -4,9 +4,10 @@ use crate::clock;
 use crate::error::Error;
 use crate::target::Target;
 use arrow_array::cast::AsArray;
-use arrow_array::types::{Int64Type, TimestampSecondType};
-use arrow_array::{ArrayRef, Float64Array, RecordBatch, TimestampMillisecondArray};
-use arrow_schema::{DataType, TimeUnit};
+use arrow_array::types::{Float64Type, Int64Type, TimestampSecondType};
+use arrow_array::{ArrayRef, Float64Array, RecordBatch, StringArray, TimestampMillisecondArray};
+use arrow_schema::{DataType, Field, TimeUnit};
+use fewbits_recipes::words;
 use fewbits_record::{Block, Schema, TimeBase, TimeFormat};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
@@ -45,6 +46,11 @@ fn type_of_times(time: TimeBase, own: &DataType) -> DataType {
     }
 }
 
+/// The words of a column; `None` if it has numbers.
+fn words_of(schema: &Schema, column: usize) -> Option<Vec<String>> {
+    words::of(schema.columns().get(column)?.unit())
+}
+
 /// The fields of a recording with the types of Parquet.
 fn fields_of(schema: &Schema) -> arrow_schema::Schema {
     let own = schema.to_arrow();
@@ -61,15 +67,16 @@ fn fields_of(schema: &Schema) -> arrow_schema::Schema {
     } else {
         time
     });
-    arrow_schema::Schema::new(
-        std::iter::once(time)
-            .chain(own.fields().iter().skip(1).cloned())
-            .collect::<Vec<_>>(),
-    )
+    let values = own.fields().iter().skip(1).enumerate();
+    let values = values.map(|(i, field)| match words_of(schema, i) {
+        Some(_) => Arc::new(Field::new(field.name(), DataType::Utf8, true)),
+        None => field.clone(),
+    });
+    arrow_schema::Schema::new(std::iter::once(time).chain(values).collect::<Vec<_>>())
 }
 
 /// A batch with the types of [`fields_of`].
-fn with_times(batch: &RecordBatch, schema: &Schema) -> Result<RecordBatch, Error> {
+fn typed(batch: &RecordBatch, schema: &Schema) -> Result<RecordBatch, Error> {
     let time = schema.time();
     let own = batch.column(0);
     let times: ArrayRef = match own.data_type() {
@@ -87,9 +94,22 @@ fn with_times(batch: &RecordBatch, schema: &Schema) -> Result<RecordBatch, Error
         }
         _ => own.clone(),
     };
-    let columns: Vec<ArrayRef> = std::iter::once(times)
-        .chain(batch.columns().iter().skip(1).cloned())
-        .collect();
+    let texts = |array: &ArrayRef, words: &[String]| -> ArrayRef {
+        let word = |number: Option<f64>| words.get(number? as usize).map(String::as_str);
+        Arc::new(
+            array
+                .as_primitive::<Float64Type>()
+                .iter()
+                .map(word)
+                .collect::<StringArray>(),
+        )
+    };
+    let values = batch.columns().iter().skip(1).enumerate();
+    let values = values.map(|(i, array)| match words_of(schema, i) {
+        Some(words) => texts(array, &words),
+        None => array.clone(),
+    });
+    let columns: Vec<ArrayRef> = std::iter::once(times).chain(values).collect();
     RecordBatch::try_new(Arc::new(fields_of(schema)), columns).map_err(refused("Parquet"))
 }
 
@@ -151,7 +171,7 @@ impl Sink {
             .block
             .to_record_batch(&self.schema)
             .map_err(Error::recording(&self.file))?;
-        let batch = with_times(&batch, &self.schema)?;
+        let batch = typed(&batch, &self.schema)?;
         self.clear();
         self.writer.write(&batch).map_err(refused(&self.file))
     }

@@ -135,6 +135,12 @@ impl Target {
         &self.name
     }
 
+    /// A handle of a file whose rows cannot be read again.
+    pub(crate) fn spare(&self) -> Option<File> {
+        let is_kept = matches!(self.place, Place::New { .. } | Place::Beside { is_kept: true, .. });
+        self.file.as_ref().filter(|_| is_kept)?.try_clone().ok()
+    }
+
     /// Writes out everything and gives a file its final name.
     pub(crate) fn finish(mut self) -> Result<(), Error> {
         self.flush().map_err(Error::io(&self.name, "write"))?;

@@ -213,6 +213,13 @@ fn text(verdict: &Shown<'_>) -> String {
         for failure in &column.first_failures {
             let _ = writeln!(text, "  {failure}");
         }
+        if column
+            .first_failures
+            .iter()
+            .any(|failure| failure.ends_with("restored as a gap"))
+        {
+            let _ = writeln!(text, "  if such cells mean gaps, name them with --missing, as for pack");
+        }
     }
     if verdict.ticks_failed > 0 {
         let _ = writeln!(text, "time: FAILS in {} rows", verdict.ticks_failed);

@@ -16,7 +16,10 @@ const COARSE: i64 = 1 << 52;
 pub fn unit(table: &Table, column: usize) -> String {
     match table.columns().get(column).map(|column| (column.kind, &column.unit)) {
         Some((Kind::Words, _)) => words::unit(table.words(column)),
-        Some((Kind::Time, _)) => "s since 1970".to_owned(),
+        Some((Kind::Time, _)) => match table.scale(column) {
+            Some(Scale::Seconds) => "s".to_owned(),
+            _ => "s since 1970".to_owned(),
+        },
         Some((_, unit)) => unit.clone(),
         None => String::new(),
     }

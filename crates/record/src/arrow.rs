@@ -9,7 +9,7 @@
 //! | any other | `time`: 64-bit integers, ticks; metadata `decimals` |
 
 use crate::block::{Block, Cells};
-use crate::error::Error;
+use crate::error::{Error, listed};
 use crate::integers::Integers;
 use crate::recorder::Recorder;
 use crate::schema::{Schema, TimeBase, TimeFormat};
@@ -284,10 +284,9 @@ impl<W: Write> Recorder<W> {
         let array = |name: &str| {
             batch.column_by_name(name).ok_or_else(|| {
                 let fields = batch.schema();
-                let existing: Vec<&str> = fields.fields().iter().map(|field| field.name().as_str()).collect();
                 Error::UnknownColumn {
                     name: name.to_owned(),
-                    existing: existing.join(", "),
+                    existing: listed(fields.fields().iter().map(|field| field.name().as_str())),
                 }
             })
         };

@@ -58,7 +58,7 @@ pub enum Error {
     UnknownColumn {
         /// The requested name.
         name: String,
-        /// The existing names, separated by commas.
+        /// The existing names, separated by commas; of more than 20 the first ones, and the number of others.
         existing: String,
     },
     /// Arrow refused a batch.
@@ -136,4 +136,14 @@ impl Error {
     pub(crate) fn io(action: &'static str) -> impl Fn(io::Error) -> Self {
         move |source| Self::Io { action, source }
     }
+}
+
+/// Names with commas between them; of more than 20 the first ones, and the number of others.
+pub(crate) fn listed<'a>(mut names: impl Iterator<Item = &'a str>) -> String {
+    let mut text = names.by_ref().take(20).collect::<Vec<_>>().join(", ");
+    match names.count() {
+        0 => {}
+        more => text += &format!(" and {more} more"),
+    }
+    text
 }

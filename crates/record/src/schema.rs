@@ -1,7 +1,7 @@
 //! The schema of a recording: its columns, time, size of blocks.
 
 use crate::column::{Column, text};
-use crate::error::Error;
+use crate::error::{Error, listed};
 use fewbits_block_codec::ArgumentError;
 
 /// Largest number of cells (rows times columns, time included) of one block, which a reader must hold in memory.
@@ -198,7 +198,7 @@ impl Schema {
             .position(|column| column.name == name)
             .ok_or_else(|| Error::UnknownColumn {
                 name: name.to_owned(),
-                existing: self.columns.iter().map(Column::name).collect::<Vec<_>>().join(", "),
+                existing: listed(self.columns.iter().map(Column::name)),
             })
     }
 }

@@ -329,6 +329,12 @@ fn arranged(text: &str) -> Option<String> {
         lengths.contains(&word.len()) && word.bytes().all(|c| c.is_ascii_digit())
     };
     let bare = |word: &str| word.trim_end_matches(['.', 's', 't', 'n', 'd', 'r', 'h']).to_owned();
+    if let ([year], false) = (words.as_slice(), has_day)
+        && is_number(year, 4..=4)
+    {
+        // A month alone is that of its first day.
+        return Some(format!("{year}-{month:02}-01"));
+    }
     let day = words.iter().position(|word| is_number(&bare(word), 1..=2))?;
     let day = bare(words.remove(day));
     let year = words.iter().position(|word| is_number(word, 4..=4))?;

@@ -8,9 +8,12 @@ use crate::error::Error;
 use crate::guess::{self, Doubt};
 use crate::interval;
 use crate::named::{NAMES, OF_DAY, is_exact_name, is_time_name};
-use crate::parts::{calendar, monthly, of_day_parts, parts};
+use crate::parts::{Part, calendar, is_hour_and_minute, monthly, of_day_parts, parts};
 use crate::time::{Scale, Unit};
 use crate::written::{self, Clock, Order, Problem, Syntax};
+
+/// Seconds from 1970 to 2200: later times of a logger count from another year.
+const SECONDS_OF_2200: f64 = 7_258_118_400.0;
 
 /// What the cells of a column say of the time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -172,8 +175,14 @@ fn offset_in(name: &str) -> Option<String> {
     civil::offset(&text).map(|_| text)
 }
 
-/// How times of these columns are written, by what is said and by a sample of their cells (joined by a space).
-pub(crate) fn clock(names: &[&str], sample: &[String], dialect: &mut Dialect) -> Result<Clock, Refused> {
+/// How times of these columns are written, by what is said and by a sample of their cells (joined by a space). `are_hours`: whether the
+/// second column has hours behind a date ([`parts::are_hours`](crate::parts::are_hours)).
+pub(crate) fn clock(
+    names: &[&str],
+    sample: &[String],
+    are_hours: Option<bool>,
+    dialect: &mut Dialect,
+) -> Result<Clock, Refused> {
     let cells: Vec<&str> = sample.iter().map(String::as_str).collect();
     let mut zone_text = dialect.time_zone.clone();
     let is_epw = dialect.format.as_deref() == Some("EPW");
@@ -182,7 +191,7 @@ pub(crate) fn clock(names: &[&str], sample: &[String], dialect: &mut Dialect) ->
         && let Some(meaning) = parts(names, sample)
     {
         Syntax::Parts(meaning, is_epw)
-    } else if let Some(found) = dated_hours(names, sample, dialect.time_format.as_deref()) {
+    } else if let Some(found) = dated_hours(names, sample, are_hours, dialect.time_format.as_deref()) {
         found?
     } else {
         match dialect.time_format.as_deref() {
@@ -219,6 +228,18 @@ pub(crate) fn clock(names: &[&str], sample: &[String], dialect: &mut Dialect) ->
     if syntax == Syntax::Number(Unit::Seconds) && dialect.time_format.is_none() && may_be_julian(names, &cells) {
         return Err(Refused::Cell(0, written::JULIAN));
     }
+    let largest = || {
+        cells
+            .iter()
+            .filter_map(|cell| cell.parse::<f64>().ok())
+            .fold(0.0_f64, |most, x| most.max(x.abs()))
+    };
+    if let (Syntax::Number(unit), None) = (&syntax, &dialect.time_format)
+        && *unit != Unit::Seconds
+        && largest() > SECONDS_OF_2200 * 10_f64.powi(i32::from(unit.decimals()))
+    {
+        return Err(Refused::Cell(0, written::FAR));
+    }
     let has_offset = match &syntax {
         Syntax::Date(order) => cells.iter().any(|cell| guess::has_offset(cell, *order)),
         Syntax::Format(format) => ["%z", "%:z", "%Q", "%s", "%c"].iter().any(|part| format.contains(part)),
@@ -235,12 +256,6 @@ pub(crate) fn clock(names: &[&str], sample: &[String], dialect: &mut Dialect) ->
         zone_text = names.iter().find_map(|name| offset_in(name));
         dialect.time_zone.clone_from(&zone_text);
     }
-    let largest = || {
-        cells
-            .iter()
-            .filter_map(|cell| cell.parse::<f64>().ok())
-            .fold(0.0_f64, |most, x| most.max(x.abs()))
-    };
     let scale = match &syntax {
         // Numbers of one unit that are smaller than its times since 1970 count from a zero of the logger.
         Syntax::Number(unit)
@@ -294,8 +309,12 @@ fn with_stated_unit(syntax: Syntax, names: &[&str], cells: &[&str], dialect: &mu
 }
 
 /// A date in the first column and the hour, and perhaps minute and second, in those behind it.
-fn dated_hours(names: &[&str], sample: &[String], format: Option<&str>) -> Option<Found> {
-    let behind = of_day_parts(names.get(1..)?.iter().copied());
+fn dated_hours(names: &[&str], sample: &[String], are_hours: Option<bool>, format: Option<&str>) -> Option<Found> {
+    let mut behind = of_day_parts(names.get(1..)?.iter().copied());
+    let is_alone = matches!((behind.as_slice(), names), ([], [_, name]) if !is_hour_and_minute(name));
+    if is_alone && are_hours.is_some() {
+        behind.push(Part::Hour);
+    }
     if behind.is_empty() || behind.len() + 1 != names.len() {
         return None;
     }
@@ -316,6 +335,9 @@ fn dated_hours(names: &[&str], sample: &[String], format: Option<&str>) -> Optio
             Err(refused) => return Some(Err(refused)),
         },
     };
+    if is_alone && are_hours == Some(false) {
+        return Some(Err(Refused::Cell(0, written::HOURS)));
+    }
     Some(Ok(Syntax::DateAnd(order, behind)))
 }
 
@@ -334,10 +356,11 @@ fn majority(cells: &[&str]) -> Found {
             .then(|| guess::detect(&good))
             .flatten()
     });
+    let is_spelled = |cell: &&str| interval::spelled(cell).is_some() || interval::lettered(cell).is_some();
     match found {
         Some(Ok(syntax)) => Ok(syntax),
         Some(Err(doubt)) => Err(Refused::Doubt(doubt)),
-        None if cells.iter().all(|cell| interval::spelled(cell).is_some()) => Ok(Syntax::Spelled),
+        None if cells.iter().all(is_spelled) => Ok(Syntax::Spelled),
         None => {
             let first = cells
                 .iter()

@@ -2,6 +2,7 @@
 
 use crate::civil;
 use crate::interval;
+use crate::named::OF_DAY;
 use crate::time::{SECOND, Time, Unit};
 use crate::written::{Clock, NO_TIME, Order, Problem, Syntax};
 
@@ -23,9 +24,31 @@ pub(crate) fn by_name(names: &[&str], cells: &[&str]) -> Option<Syntax> {
         None
     } else if has_date_name(names) && cells.iter().all(is_day) {
         Some(Syntax::Date(Order::Ymd))
+    } else if are_minutes(names, cells) {
+        Some(Syntax::Format("%M:%S%.f".to_owned()))
     } else {
-        (is_of_day_name(names) && cells.iter().all(|cell| civil::of_digits(cell).is_some())).then_some(Syntax::OfDay)
+        let is_time = is_of_day_name(names) || are_digits_of_time(names, cells);
+        (is_time && cells.iter().all(|cell| civil::of_digits(cell).is_some())).then_some(Syntax::OfDay)
     }
+}
+
+/// Whether the name of a column of two numbers with a colon says that these are minutes and seconds, as `Time (mm:ss)`.
+fn are_minutes(names: &[&str], cells: &[&str]) -> bool {
+    let [name] = names else { return false };
+    let name = name.to_lowercase();
+    let is_said = ["m:s", "min:s"].iter().any(|words| {
+        let at = name.find(words);
+        let before = at.map(|at| name[..at].trim_end_matches('m'));
+        before.is_some_and(|before| before.is_empty() || before.ends_with(['(', '[', ' ']))
+    });
+    is_said && cells.iter().all(|cell| cell.matches(':').count() == 1)
+}
+
+/// Whether a column of the time has numbers of six digits, some behind a zero, as `095800`, which counts do not have.
+fn are_digits_of_time(names: &[&str], cells: &[&str]) -> bool {
+    matches!(names, [name] if OF_DAY.contains(&name.to_lowercase().as_str()))
+        && cells.iter().all(|cell| cell.len() == 6)
+        && cells.iter().any(|cell| cell.starts_with('0'))
 }
 
 /// Whether a column is named as one of times of day without marks, as receivers of satellites write them: `213000.50`.
@@ -86,6 +109,9 @@ impl Clock {
 
     /// A number with its unit behind it.
     pub(crate) fn spelled(&self, text: &str) -> Result<Time, Problem> {
+        if let Some(time) = interval::lettered(text) {
+            return Ok(time);
+        }
         let (number, unit) = interval::spelled(text).ok_or(NO_TIME)?;
         match interval::part(unit) {
             Some(part) => self.number(number, part),

@@ -23,6 +23,18 @@ pub(crate) fn modal(lines: &[&str], split: Split) -> (usize, usize) {
     counts.into_iter().max_by_key(|(_, lines)| *lines).unwrap_or((1, 0))
 }
 
+/// Whether each row begins with a name in quotes that has none in the line of names, as R writes tables.
+pub(crate) fn names_its_rows(lines: &[&str], split: Split) -> bool {
+    let width = |line: &&str| cells(line, split).len();
+    let [first, others @ ..] = lines else { return false };
+    let count = width(first) + 1;
+    !others.is_empty()
+        && lines.iter().all(|line| line.as_bytes().first() == Some(&split.quote))
+        && others.iter().all(|line| width(line) == count)
+        // Numbers stand without quotes, or all cells have them.
+        && others.iter().any(|line| line.bytes().filter(|c| *c == split.quote).count() < 2 * count)
+}
+
 /// Largest number of titles above names that are aligned by spaces.
 const MAX_TITLES: usize = 5;
 
@@ -94,7 +106,10 @@ pub(crate) fn delimiter(lines: &[&str], quote: u8) -> Delimiter {
                 && lines[data..].iter().all(|line| words(line) == count && is_number(line))
         })
     };
-    if count >= 2 && 10 * found >= 8 * later && (counts.first() == Some(&count) || is_titled()) {
+    if count >= 2
+        && 10 * found >= 8 * later
+        && (counts.first() == Some(&count) || is_titled() || names_its_rows(lines, spaces))
+    {
         return Delimiter::Spaces;
     }
     Delimiter::Byte(b',')

@@ -1,6 +1,6 @@
 //! Detection of a dialect from the first lines of a table.
 
-use crate::delimiter::{cells, delimiter, modal};
+use crate::delimiter::{cells, delimiter, modal, names_its_rows};
 use crate::dialect::{Delimiter, Dialect};
 use crate::error::{Error, Place};
 use crate::head::Head;
@@ -95,11 +95,15 @@ pub(crate) fn detect(head: &Head, dialect: &mut Dialect) -> Result<Layout, Error
     dialect.delimiter = Some(delimiter.shown());
     let split = Split { delimiter, quote };
     let count = modal(&filled, split).0;
-    let rows: Vec<(u64, Vec<String>)> = lines
+    let mut rows: Vec<(u64, Vec<String>)> = lines
         .iter()
         .map(|(number, line)| (*number, cells(line, split)))
         .filter(|(_, cells)| cells.len() > 1 || cells.iter().any(|cell| !cell.is_empty()))
         .collect();
+    if names_its_rows(&filled, split) {
+        // The names of rows have no name.
+        rows[0].1.insert(0, String::new());
+    }
     if dialect.decimal.is_none() {
         let is_comma = delimiter != Delimiter::Byte(b',') && marks::has_decimal_commas(&rows);
         if let (false, None, Some((line, cell))) = (is_comma, dialect.thousands, marks::doubtful_groups(&rows)) {
@@ -294,13 +298,44 @@ fn layout(
                 }
                 header -= 1;
             }
+            if count > 1 && rows[header].1.len() == 1 {
+                return Err(Error::Line {
+                    place: Place {
+                        line: rows[data].0,
+                        row: 0,
+                    },
+                    problem: format!(
+                        "there is no line of names: this row has {count} cells, and the line above has 1 ({} lines stand above)",
+                        lines_before(rows[data].0)
+                    ),
+                    mend: "say --no-header, and --skip with the number of lines above; or what separates cells with --delimiter",
+                });
+            }
             dialect.skip = Some(lines_before(rows[header].0));
-            Ok(from_header(rows, header, dialect))
+            let mut found = from_header(rows, header, dialect);
+            if let (Some((_, names)), Some((_, above))) = (&mut found.names, header.checked_sub(1).map(|i| &rows[i])) {
+                take_names_above(names, above, filled(&rows[data].1), comma);
+            }
+            Ok(found)
         }
         None => {
             dialect.skip = Some(0);
             Ok(from_header(rows, 0, dialect))
         }
+    }
+}
+
+/// Names of the line above for columns that have none in the last one, which names the columns of an index alone.
+/// `width`: number of cells of a row.
+fn take_names_above(names: &mut [String], above: &[String], width: usize, comma: bool) {
+    let count = filled(names);
+    if width <= count {
+        return;
+    }
+    let is_index = count > 0 && names[..count].iter().all(|name| !name.is_empty());
+    let others = above.get(count..names.len()).unwrap_or_default();
+    if is_index && !others.is_empty() && others.iter().all(|name| look(name, comma) == Look::Text) {
+        names[count..].clone_from_slice(others);
     }
 }
 

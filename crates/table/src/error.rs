@@ -58,9 +58,9 @@ pub enum Error {
         /// What to do.
         mend: String,
     },
-    /// The dates of a column may have the day or the month first, by the first rows. All rows may decide:
+    /// The dates of a column may have the day or the month first, or all are one day and may have the year first, by the first rows. All rows may decide:
     /// [`Profile::day_order`](crate::Profile::day_order).
-    #[error("{place}, column `{column}`: `{cell}` may have the day or the month first: {mend}")]
+    #[error("{place}, column `{column}`: `{cell}` {problem}: {mend}")]
     DayOrMonth {
         /// Where.
         place: Place,
@@ -68,6 +68,8 @@ pub enum Error {
         column: String,
         /// The cell, at most 80 characters of it.
         cell: String,
+        /// What is open.
+        problem: &'static str,
         /// What to do.
         mend: String,
     },

@@ -11,14 +11,21 @@ pub(crate) enum Doubt {
     DayOrMonth,
     /// The year may stand first or last.
     Year,
+    /// The same, of dates that are all one day: rows behind them may decide.
+    YearOfOneDay,
 }
 
 impl Doubt {
     pub(crate) fn problem(self) -> Problem {
         match self {
             Self::DayOrMonth => civil::AMBIGUOUS,
-            Self::Year => civil::YEAR,
+            Self::Year | Self::YearOfOneDay => civil::YEAR,
         }
+    }
+
+    /// Whether further rows may decide.
+    pub(crate) fn may_be_decided(self) -> bool {
+        self != Self::Year
     }
 }
 
@@ -59,12 +66,15 @@ pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Doubt>> {
         return all(Syntax::Date(Order::Ymd)).then_some(Ok(Syntax::Date(Order::Ymd)));
     }
     let (dmy, mdy) = (all(Syntax::Date(Order::Dmy)), all(Syntax::Date(Order::Mdy)));
-    if (dmy || mdy) && may_have_year_first(cells) {
-        return Some(Err(Doubt::Year));
-    }
     let is_dotted = cells
         .iter()
         .all(|cell| digits(cell.trim(), 2).is_some_and(|(_, _, rest)| rest.starts_with('.')));
+    if let (true, Some(doubt)) = (dmy || mdy, may_have_year_first(cells)) {
+        // Points stand in dates with the day first.
+        if doubt == Doubt::Year || (dmy && !mdy && !is_dotted) {
+            return Some(Err(doubt));
+        }
+    }
     let is_worded = cells.iter().all(|cell| {
         cell.trim()
             .bytes()
@@ -89,17 +99,24 @@ pub(crate) fn three(cell: &str) -> Option<([i64; 3], bool)> {
     Some(([first, second, third], first_count.max(second_count).max(third_count) <= 2))
 }
 
-/// Whether dates of two digits each may be of one year that stands first: their first number stays, and their last changes.
-fn may_have_year_first(cells: &[&str]) -> bool {
+/// Whether dates of two digits each may be of one year that stands first: their first number stays, and their last changes, or all are one
+/// day.
+fn may_have_year_first(cells: &[&str]) -> Option<Doubt> {
     let dates: Option<Vec<[i64; 3]>> = cells
         .iter()
         .map(|cell| three(cell).filter(|(_, is_short)| *is_short).map(|(date, _)| date))
         .collect();
     let is_date = |[_, month, day]: &[i64; 3]| (1..=12).contains(month) && (1..=31).contains(day);
-    dates.is_some_and(|dates| {
-        let varies = |i: usize| dates.iter().any(|date| date[i] != dates[0][i]);
-        varies(2) && !varies(0) && dates.iter().all(is_date)
-    })
+    let dates = dates?;
+    let varies = |i: usize| dates.iter().any(|date| date[i] != dates[0][i]);
+    if varies(0) || !dates.iter().all(is_date) {
+        return None;
+    }
+    match (varies(1), varies(2)) {
+        (_, true) => Some(Doubt::Year),
+        (false, false) => Some(Doubt::YearOfOneDay),
+        (true, false) => None,
+    }
 }
 
 /// Whether a written time says something of its zone.

@@ -1,7 +1,7 @@
 //! Units of times in names of columns, as of `time_ms`, `Time [us]`, `elapsedMs` and `t/h`.
 
 use crate::hint::without_unit;
-use crate::time::Unit;
+use crate::time::{Time, Unit};
 
 /// Unit of times that are numbers, as `--time-format` says it.
 const WORDS: [(&str, &[&str]); 7] = [
@@ -65,6 +65,16 @@ pub(crate) fn spelled(cell: &str) -> Option<(&str, &'static str)> {
         .parse::<f64>()
         .is_ok_and(f64::is_finite)
         .then_some((number, unit))
+}
+
+/// A time of hours, minutes and seconds by their letters, as `PT1M0.5S` and `1m30.5s`.
+pub(crate) fn lettered(cell: &str) -> Option<Time> {
+    let letters = cell.bytes().filter(u8::is_ascii_alphabetic).count();
+    if !cell.starts_with('P') && letters != cell.bytes().filter(|c| b"hms".contains(c)).count() {
+        return None;
+    }
+    let duration: jiff::SignedDuration = cell.parse().ok()?;
+    Some(Time::checked(duration.as_secs(), i128::from(duration.subsec_nanos()) * 1_000_000_000))
 }
 
 /// Whether a name states a unit of time in brackets, or is the word for one that has no other meaning.

@@ -62,6 +62,10 @@ impl Rows {
                 // The mark of an encoding, where files were joined.
                 row.text.drain(..MARK.len());
             }
+            if !row.text.is_empty() && row.text.iter().all(|c| matches!(c, 0x1a | 0x0c)) {
+                // The end of a file of DOS, and of a printed page.
+                continue;
+            }
             if let Some(keys) = &self.keys {
                 return json::row(keys, row, &found);
             }
@@ -119,6 +123,16 @@ impl Rows {
                 .iter()
                 .enumerate()
                 .all(|(i, name)| row.cell(i) == name.as_bytes())
+    }
+
+    /// Whether a row has the names in another order, as where a file of another program was joined.
+    pub(crate) fn has_names_moved(&self, row: &Row) -> bool {
+        let sorted = |mut names: Vec<String>| {
+            names.sort_unstable();
+            names
+        };
+        let length = self.header.len();
+        length > 1 && row.cells.len() == length && sorted(row.texts()) == sorted(self.header.clone())
     }
 
     /// Whether a row is one of the lines before the data, as in files that were joined.

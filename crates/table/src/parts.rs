@@ -38,6 +38,11 @@ fn part(name: &str, before: &[Part]) -> Option<Part> {
     (!before.contains(&found)).then_some(found)
 }
 
+/// Whether a name says that hours and minutes stand in one number.
+pub(crate) fn is_hour_and_minute(name: &str) -> bool {
+    ["hhmm", "hrmn", "hrmin", "hour_minute"].contains(&name.to_lowercase().as_str())
+}
+
 /// Columns side by side that give a date by their names, from the year on.
 pub(crate) fn calendar(columns: &[Column]) -> Option<Vec<usize>> {
     let first = columns
@@ -120,6 +125,22 @@ pub(crate) fn of_day_parts<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<
         }
     }
     found
+}
+
+/// Whether cells of one or two digits beside dates are hours; `None` if there is nothing to decide, `Some(false)` if they may be minutes
+/// behind midnight, as `5` of `0005`, or seconds.
+pub(crate) fn are_hours(dates: &[String], cells: &[String]) -> Option<bool> {
+    let hours = cells.iter().map(|cell| match cell.len() {
+        1 | 2 => cell.parse::<u8>().ok().filter(|hour| *hour < 60),
+        _ => None,
+    });
+    let latest = hours
+        .collect::<Option<Vec<u8>>>()?
+        .into_iter()
+        .max()
+        .filter(|hour| *hour > 0)?;
+    // Minutes in steps of some days would all be behind midnight.
+    Some((6..=24).contains(&latest) && dates.iter().any(|date| *date != dates[0]))
 }
 
 /// The cells of a date and a time of day as one text.

@@ -55,6 +55,8 @@ pub struct Profile {
     pub decimals: u8,
     /// Whether some date has a day first that is no month, and whether some has one in the second place.
     days: (bool, bool),
+    /// The first number of a date of two digits each, and whether there are others: a year stands first otherwise.
+    first_numbers: Option<(i64, bool)>,
     /// The first cell that is no number.
     pub first_text: Option<(Place, String)>,
     pub(crate) sample: Vec<String>,
@@ -176,13 +178,17 @@ impl Profile {
             self.keep(text);
         }
         self.times += 1;
-        if let Some((first, second)) = quick::first_two(cell) {
-            self.decide(first, second);
+        if let Some(date) = quick::first_two(cell) {
+            self.decide(date);
         }
     }
 
     /// Notes what the first two numbers of a date say of their order.
-    fn decide(&mut self, first: i64, second: i64) {
+    fn decide(&mut self, (first, second, has_short_year): (i64, i64, bool)) {
+        if has_short_year {
+            let (known, varies) = self.first_numbers.get_or_insert((first, false));
+            *varies |= *known != first;
+        }
         self.days.0 |= (13..=31).contains(&first);
         self.days.1 |= (13..=31).contains(&second);
     }
@@ -253,8 +259,8 @@ impl Profile {
             return Some(Class::Gap);
         } else if guess::looks_like_time(cell) {
             self.times += 1;
-            if let Some(([first, second, _], _)) = guess::three(cell) {
-                self.decide(first, second);
+            if let Some(([first, second, _], is_short)) = guess::three(cell) {
+                self.decide((first, second, is_short));
             }
             return None;
         } else if looks_like_number(cell) {
@@ -332,7 +338,8 @@ impl Profile {
     /// 12, `mdy` if some have such a second one. `None` if none has, or both occur.
     pub fn day_order(&self) -> Option<&'static str> {
         match self.days {
-            (true, false) => Some("dmy"),
+            // A number that stays in front of two others of two digits may be the year.
+            (true, false) => Some("dmy").filter(|_| self.first_numbers.is_none_or(|(_, varies)| varies)),
             (false, true) => Some("mdy"),
             _ => None,
         }

@@ -66,14 +66,15 @@ fn civil(text: &[u8], order: Order) -> Option<([i64; 3], &[u8])> {
     }
 }
 
-/// The first two numbers of a date whose year does not stand first.
-pub(crate) fn first_two(text: &[u8]) -> Option<(i64, i64)> {
+/// The first two numbers of a date whose year does not stand first, and whether the third has two digits.
+pub(crate) fn first_two(text: &[u8]) -> Option<(i64, i64, bool)> {
     let (first, rest) = short(text)?;
     let (mark, rest) = rest
         .split_first()
         .filter(|(mark, _)| matches!(mark, b'/' | b'-' | b'.'))?;
     let (second, rest) = short(rest)?;
-    (rest.first() == Some(mark)).then_some((first, second))
+    let rest = rest.strip_prefix(std::slice::from_ref(mark))?;
+    Some((first, second, !rest.get(2).is_some_and(u8::is_ascii_digit)))
 }
 
 /// Seconds and attoseconds of a time of day, and what follows.

@@ -43,16 +43,25 @@ impl Table {
                 Ok(()) => self.next_into(batch),
                 Err(error) => Err(error),
             };
-            let error = match outcome {
+            let mut error = match outcome {
                 Ok(true) => continue,
                 Ok(false) => break,
                 Err(error) => self.placed(error),
             };
             batch.cut();
             let is_of_row = error.place().is_some();
+            let is_moved = is_of_row && self.rows.has_names_moved(&self.row);
+            if is_moved {
+                // Cells behind this line are those of other columns, so that it is not left out.
+                error = Error::Line {
+                    place: self.own_place(self.place()),
+                    problem: "the names stand in another order than in the first line".to_owned(),
+                    mend: "make a file of its own of this line and all behind it",
+                };
+            }
             if is_of_row && self.rows.is_preamble(&self.row) {
                 self.skipped.repeated += 1;
-            } else if is_of_row && self.skipped.bad < self.dialect.skip_bad {
+            } else if is_of_row && !is_moved && self.skipped.bad < self.dialect.skip_bad {
                 self.skip(&error);
             } else if batch.rows > 0 {
                 self.late_error = Some(error);

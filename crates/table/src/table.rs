@@ -168,7 +168,7 @@ impl Table {
                     ..self.dialect.clone()
                 };
                 let name = self.columns[i].own_name.clone();
-                self.clocks[i] = clock::clock(&[&name], &self.profiles[i].sample, &mut own).ok();
+                self.clocks[i] = clock::clock(&[&name], &self.profiles[i].sample, None, &mut own).ok();
             }
         }
     }

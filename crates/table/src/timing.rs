@@ -2,8 +2,8 @@
 
 use crate::clock::{self, Refused};
 use crate::error::{Error, Place, printable};
-use crate::guess::Doubt;
 use crate::interval;
+use crate::parts;
 use crate::table::Table;
 use crate::time::Scale;
 #[cfg(feature = "parquet")]
@@ -100,10 +100,14 @@ impl Table {
             .unwrap_or(0);
         let joined = |row: usize| {
             let cells: Vec<&str> = columns.iter().map(|i| self.profiles[*i].sample[row].as_str()).collect();
-            crate::parts::joined(&cells)
+            parts::joined(&cells)
         };
         let sample: Vec<String> = (0..length).map(joined).collect();
-        let found = clock::clock(&own, &sample, &mut self.dialect);
+        let are_hours = match columns.as_slice() {
+            [date, hour] => parts::are_hours(&self.profiles[*date].sample, &self.profiles[*hour].sample),
+            _ => None,
+        };
+        let found = clock::clock(&own, &sample, are_hours, &mut self.dialect);
         let found = found.map_err(|refused| self.time_refused(&columns, &sample, refused))?;
         self.dialect.time_column = columns.iter().map(|i| self.columns[*i].name.clone()).collect();
         self.selected.retain(|column| !columns.contains(column));
@@ -116,7 +120,7 @@ impl Table {
         let (row, (problem, mend), is_order) = match refused {
             Refused::Option(error) => return error,
             Refused::Cell(row, problem) => (row, problem, false),
-            Refused::Doubt(doubt) => (0, doubt.problem(), doubt == Doubt::DayOrMonth),
+            Refused::Doubt(doubt) => (0, doubt.problem(), doubt.may_be_decided()),
         };
         let first_text = columns.first().and_then(|i| self.profiles[*i].first_text.as_ref());
         let first_row = Place {
@@ -137,6 +141,7 @@ impl Table {
                 place,
                 column,
                 cell,
+                problem,
                 mend,
             };
         }
@@ -154,6 +159,15 @@ impl Table {
         self.time
             .as_ref()
             .map(|(columns, clock)| (columns.as_slice(), clock.scale))
+    }
+
+    /// What the cells of a column of [`Kind::Time`](crate::Kind::Time) are measured from.
+    pub fn scale(&self, column: usize) -> Option<Scale> {
+        #[cfg(feature = "parquet")]
+        if let Some(rows) = &self.arrow {
+            return (column < self.columns.len()).then(|| rows.scale(column)).flatten();
+        }
+        self.clocks.get(column)?.as_ref().map(|clock| clock.scale)
     }
 
     /// The name of the only column of the time, without the unit if times are seconds that the column has in another unit: what a column of

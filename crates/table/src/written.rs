@@ -48,6 +48,14 @@ pub(crate) const JULIAN: Problem = (
     "may be a Julian date, a number of days",
     "say --time-format jd (or mjd), or --time-format s if these are seconds",
 );
+pub(crate) const FAR: Problem = (
+    "is behind the year 2200 if it counts parts of a second since 1970",
+    "say --time-format ms, us or ns if it does, s if these are seconds; or convert the column, which may count from another year",
+);
+pub(crate) const HOURS: Problem = (
+    "may have hours or minutes behind the date",
+    "say --time-format '%Y-%m-%d %H' for hours, with the date as it is written, or --time-format '%Y-%m-%d %H%M'",
+);
 const NO_ZONE: Problem = ("has no offset, rows before have one", "mend the cell, or say --time-zone");
 const DOUBTFUL: Problem = (
     "is no time of that zone, or two (a change of daylight saving)",
@@ -296,6 +304,7 @@ impl Clock {
         let (meaning, ends) = match &self.syntax {
             Syntax::Parts(meaning, ends) => (meaning, ends),
             Syntax::DateAnd(order, behind) => return self.date_and(cells, *order, behind),
+            Syntax::Format(format) if !format.contains("%M") => return self.formatted(&cells.join(" "), format),
             _ => return self.parse(&joined(cells)),
         };
         let (mut parts, mut fraction) = ([0_i64, 1, 1, 0, 0, 0], 0);

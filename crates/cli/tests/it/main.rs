@@ -390,6 +390,21 @@ fn parquet_returns_what_it_holds() {
     assert!(message.contains("there are time, price, temp"), "{message}");
 }
 
+#[cfg(feature = "parquet")]
+#[test]
+fn parquet_has_words_as_text() {
+    let (_kept, folder) = folder();
+    let table = "time,mode,temp\n0,heat,1.5\n1,,2.5\n2,\"cool, slow\",3.5\n";
+    good(&folder, &["pack", "-", "--time", "exact", "-o", "a.fewb"], table.as_bytes());
+    good(&folder, &["unpack", "a.fewb", "-o", "a.parquet"], b"");
+    let file = std::fs::File::open(folder.join("a.parquet")).unwrap();
+    let mut back = fewbits_table::Table::open_parquet(file, &fewbits_table::Dialect::default()).unwrap();
+    let mut batch = fewbits_table::Batch::default();
+    back.read(&mut batch, 10).unwrap();
+    assert_eq!(back.words(1), ["cool, slow", "heat"]);
+    assert_eq!(batch.columns[1], fewbits_table::Cells::Words(vec![Some(1), None, Some(0)]));
+}
+
 #[test]
 fn sent_stream_is_received() {
     let (_kept, folder) = folder();

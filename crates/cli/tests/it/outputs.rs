@@ -81,6 +81,15 @@ fn output_that_is_the_input_is_refused() {
 }
 
 #[test]
+fn a_dash_is_standard_output() {
+    let (_kept, folder) = folder();
+    let packed = good(&folder, &["pack", "a.csv", "-o", "-"], b"");
+    let table = good(&folder, &["unpack", "-", "--output", "-"], &packed);
+    assert_eq!(table, good(&folder, &["unpack", "-", "--output=-"], &packed));
+    assert!(text(&table).starts_with("time,temp") && !folder.join("-").exists());
+}
+
+#[test]
 fn second_input_and_second_output_are_compared_too() {
     let (_kept, folder) = folder();
     prepare(&folder);

@@ -346,3 +346,26 @@ fn commands_take_what_other_commands_took() {
     good(path, &["pack", "leap.csv", "--time", "±1s", "--append", "-o", "leap.fewb"], b"");
     assert_eq!(text(&good(path, &["unpack", "leap.fewb"], b"")).lines().count(), 7);
 }
+
+#[test]
+fn verify_names_the_option_of_gaps() {
+    let folder = folder(&[("s.csv", "time,a\n1,5.5\n2,-9999\n")]);
+    let folder = folder.path();
+    good(folder, &["pack", "s.csv", "--time", "exact", "--missing", "-9999", "-o", "s.fewb"], b"");
+    let output = fewbits(folder, &["verify", "s.csv", "s.fewb"], b"");
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stdout).contains("--missing, as for pack"), "{}", text(&output.stdout));
+    good(folder, &["verify", "s.csv", "s.fewb", "--missing", "-9999"], b"");
+}
+
+#[test]
+fn look_names_columns_of_text_that_are_no_words() {
+    let row = |i: usize| format!("{i},{}{i},\"+{i},1\",{}\n", "long ".repeat(6), i % 9);
+    let table = (0..300).fold("time,note,code,x\n".to_owned(), |text, i| text + &row(i % 60));
+    let codes = (0..300).fold("time,code\n".to_owned(), |text, i| text + &format!("{i},\"+{i},1\"\n"));
+    let folder = folder(&[("s.csv", &table), ("t.csv", &codes)]);
+    let shown = text(&good(folder.path(), &["look", "t.csv"], b""));
+    assert!(shown.contains("all of its cells: if it is text, say --without code"), "{shown}");
+    let shown = text(&good(folder.path(), &["look", "s.csv"], b""));
+    assert!(shown.contains("too long for a recording, say --without note"), "{shown}");
+}

@@ -37,6 +37,19 @@ fn columns_come_in_the_order_asked() {
     assert_eq!(refused.to_string(), "no column `weight`: the recording has wave, price, count");
 }
 
+#[test]
+fn few_of_many_names_are_listed() {
+    let columns = (0..100)
+        .map(|i| Column::new(format!("c{i}"), Bound::Lossless).unwrap())
+        .collect();
+    let message = Schema::new(columns, TimeBase::Numbered)
+        .unwrap()
+        .position("x")
+        .unwrap_err()
+        .to_string();
+    assert!(message.ends_with("c18, c19 and 80 more"), "{message}");
+}
+
 /// Columns of one code, a column of its own bytes between them, and special cells: each column alone is what it is among all.
 #[test]
 fn columns_of_one_code_are_read_alone() {

@@ -7,6 +7,7 @@ mod dialects;
 mod faults;
 mod fresh;
 mod kinds;
+mod layouts;
 mod limits;
 mod loggers;
 mod long;

@@ -1,0 +1,165 @@
+//! Layouts of files that may be read in two ways, or whose names do not stand in one line above each column.
+
+use crate::{numbers, open, open_said, refusal, rows};
+use fewbits_table::{Dialect, Scale, Table};
+
+fn lines(header: &str, count: usize, row: impl Fn(usize) -> String) -> String {
+    (0..count).fold(format!("{header}\n"), |text, i| text + &row(i) + "\n")
+}
+
+/// The times of a table as text, or why there are none.
+fn times(text: &str, columns: &[&str], format: Option<&str>) -> Result<Vec<String>, String> {
+    let said = Dialect {
+        time_format: format.map(str::to_owned),
+        ..Dialect::default()
+    };
+    let mut table = Table::open(std::io::Cursor::new(text.to_owned()), &said).map_err(|error| error.to_string())?;
+    match columns {
+        [] => table.find_time().map(|_| ()),
+        columns => table.set_time(columns),
+    }
+    .map_err(|error| error.to_string())?;
+    let batch = rows(&mut table);
+    let scale = table.time().ok_or("no time")?.1;
+    Ok(batch.times.iter().map(|time| time.shown(scale, 0)).collect())
+}
+
+#[test]
+fn a_year_of_two_digits_in_one_day_is_asked_for() {
+    for text in [
+        "time,x\n24-03-05 09:58:00.5,1\n24-03-05 09:59:00.5,2\n",
+        "date,x\n14/11/23,1\n14/11/23,2\n",
+    ] {
+        let message = times(text, &[], None).unwrap_err();
+        assert!(message.contains("year first or last") && message.contains("--time-format ymd"), "{message}");
+    }
+    // Points stand behind days, and no month is the 15th.
+    assert_eq!(times("time,x\n24.03.05,1\n", &[], None).unwrap(), ["2005-03-24T00:00:00"]);
+    assert_eq!(times("time,x\n03/15/24,1\n", &[], None).unwrap(), ["2024-03-15T00:00:00"]);
+    assert_eq!(times("time,x\n24-03-05,1\n", &[], Some("ymd")).unwrap(), ["2024-03-05T00:00:00"]);
+    // Rows behind the first ones decide if the first number is no year.
+    for (last, order) in [("15/11/23 10:00", Some("dmy")), ("14/11/23 11:00", None)] {
+        let text = lines("time,x", 100, |i| format!("14/11/23 10:00,{i}")) + last + ",1\n";
+        let opened = || open_said(&text, &Dialect::default()).unwrap();
+        assert!(opened().find_time().unwrap_err().is_day_or_month());
+        assert_eq!(opened().survey().unwrap().columns[0].day_order(), order);
+    }
+}
+
+#[test]
+fn digits_beside_a_date_are_hours_or_asked_for() {
+    let hours = |count| lines("2024-03-05,0,1", count, |i| format!("2024-03-0{},{},1", 5 + (i + 1) / 24, (i + 1) % 24));
+    let said = Dialect {
+        no_header: Some(true),
+        ..Dialect::default()
+    };
+    let mut table = open_said(&hours(40), &said).unwrap();
+    table.set_time(&["#1", "#2"]).unwrap();
+    assert_eq!(rows(&mut table).times[25].shown(Scale::Local, 0), "2024-03-06T01:00:00");
+    // The hours of one day may be minutes.
+    let text = lines("Date,Time,x", 20, |i| format!("05.03.2024,{i},1"));
+    let message = times(&text, &[], None).unwrap_err();
+    assert!(message.contains("hours or minutes") && message.contains("%H"), "{message}");
+    let columns = ["Date", "Time"];
+    assert_eq!(times(&text, &columns, Some("%d.%m.%Y %H")).unwrap()[19], "2024-03-05T19:00:00");
+    assert_eq!(times(&text, &columns, Some("%d.%m.%Y %H%M")).unwrap()[19], "2024-03-05T00:19:00");
+    let seconds = lines("since,time,x", 50, |i| format!("2024-03-05,{i},1"));
+    assert!(times(&seconds, &[], None).unwrap_err().contains("hours or minutes"));
+    assert_eq!(
+        times("Date,HHMM,x\n2024-03-05,5,1\n2024-03-05,20,1\n", &["Date", "HHMM"], None).unwrap(),
+        ["2024-03-05T00:05:00", "2024-03-05T00:20:00"]
+    );
+}
+
+#[test]
+fn names_tell_minutes_from_hours() {
+    for (name, expected) in [
+        ("Time (mm:ss)", "62"),
+        ("Elapsed [m:ss]", "62"),
+        ("Item:size", "3720"),
+        ("Time (hh:mm)", "3720"),
+        ("Time [hh:mm:ss]", "3720"),
+        ("time", "3720"),
+    ] {
+        let read = times(&format!("{name},x\n01:01,1\n01:02,2\n"), &[name], None).unwrap();
+        assert_eq!(read[1], expected, "{name}");
+    }
+    assert_eq!(times("time,x\n095800,1\n100001,2\n", &[], None).unwrap(), ["35880", "36001"]);
+    assert_eq!(times("time,x\n195800,1\n200001,2\n", &[], None).unwrap(), ["195800", "200001"]);
+}
+
+#[test]
+fn times_of_further_spellings() {
+    for (cells, expected) in [
+        (["PT0M0.5S", "PT1H1M"], ["0", "3660"]),
+        (["59s", "1m30.5s"], ["59", "90"]),
+        (["Jan 2014", "Feb 2014"], ["2014-01-01T00:00:00", "2014-02-01T00:00:00"]),
+        (["März 2014", "Mai 2014"], ["2014-03-01T00:00:00", "2014-05-01T00:00:00"]),
+    ] {
+        let text = format!("time,x\n{},1\n{},2\n", cells[0], cells[1]);
+        assert_eq!(times(&text, &[], None).unwrap(), expected, "{text}");
+    }
+}
+
+#[test]
+fn numbers_of_no_plausible_year_are_asked_for() {
+    // Microseconds since 1601.
+    let text = "time,x\n13354106280000000,1\n13354106340000000,2\n";
+    let message = times(text, &[], None).unwrap_err();
+    assert!(message.contains("behind the year 2200") && message.contains("--time-format"), "{message}");
+    assert_eq!(times(text, &["time"], Some("us")).unwrap()[0], "2393-03-05T09:58:00Z");
+    assert_eq!(times(text, &["time"], Some("s")).unwrap()[0], "13354106280000000");
+}
+
+#[test]
+fn names_in_another_order_are_not_left_out() {
+    let said = Dialect {
+        skip_bad: 9,
+        ..Dialect::default()
+    };
+    let mut table = open_said("time,a,b\n1,10,20\n2,11,21\ntime,b,a\n3,22,12\n", &said).unwrap();
+    table.find_time().unwrap();
+    let message = refusal(&mut table);
+    assert!(message.contains("line 4") && message.contains("another order"), "{message}");
+}
+
+#[test]
+fn rows_below_single_lines_have_no_names() {
+    let settings = "Serial: 1\nStart 09:58:00\nBattery: 4.1     Mode = 12\n";
+    let text = lines(&format!("{settings}----"), 9, |i| format!("{i},{},3", i + 1));
+    let message = times(&text, &[], None).unwrap_err();
+    assert!(
+        message.contains("line 5") && message.contains("--no-header") && message.contains("4 lines"),
+        "{message}"
+    );
+}
+
+#[test]
+fn names_of_rows_and_of_an_index() {
+    let text = "\"time\" \"temp\" \"ok\"\n\"1\" 0 18.5 TRUE\n\"2\" 60 NA FALSE\n";
+    let mut table = open(text);
+    let names: Vec<&str> = table.columns().iter().map(|column| column.name.as_str()).collect();
+    assert_eq!(names, ["column_1", "time", "temp", "ok"]);
+    assert_eq!(numbers(&rows(&mut table).columns[1]), [Some(18.5), None]);
+    // Of a table of pandas whose columns have two names each.
+    let table = open(",room,room\nsensor,a,b\ntime,,\n2024-03-05 09:58:00,1.5,2\n2024-03-05 09:59:00,1.6,3\n");
+    let names: Vec<&str> = table.columns().iter().map(|column| column.name.as_str()).collect();
+    assert_eq!(names, ["time", "a", "b"]);
+    // An empty cell behind the last name is no column, whatever the title has there.
+    assert_eq!(
+        open("Report,Plant A,North\ntime,temp,\n1,2.5,\n2,2.6,\n")
+            .columns()
+            .len(),
+        2
+    );
+    // Where all cells have quotes, the one too many may be the last.
+    assert!(refusal(&mut open("\"time\",\"temp\"\n\"0\",\"1\",\"2\"\n")).contains("3 cells instead of 2"));
+}
+
+#[test]
+fn marks_of_the_end_of_a_file_are_no_rows() {
+    for end in ["\u{1a}", "\u{1a}\u{1a}", "\u{c}\n"] {
+        let mut table = open(&format!("time,x\r\n1,10\r\n2,20\r\n{end}"));
+        assert_eq!(rows(&mut table).rows, 2);
+    }
+}
