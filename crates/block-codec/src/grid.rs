@@ -1,11 +1,12 @@
 //! The grid of a block's reconstructions: conversion between samples and integers.
 
+use crate::Effort;
 use crate::bytes::{push_varint, zigzag};
 use crate::vectors::vectorised_narrow;
 use fewbits_node::adaptive::TENS;
 
 /// Largest sample as a decimal integer: sums of two are exact doubles.
-const LARGEST_DIGITS: f64 = (1_u64 << 51) as f64;
+pub(crate) const LARGEST_DIGITS: f64 = (1_u64 << 51) as f64;
 /// Largest sample of single precision as a decimal integer: beyond that neighbours are the same number.
 const LARGEST_SINGLE_DIGITS: f64 = (1_u64 << 24) as f64;
 /// Integers up to this size are exact doubles.
@@ -17,8 +18,6 @@ const LARGEST_CIRCLE: f64 = (1_u64 << 40) as f64;
 /// A grid can be moved by multiples of `2^-PHASE_BITS` of a cell.
 const PHASE_BITS: u32 = 4;
 pub(crate) const PHASES: u8 = 1 << PHASE_BITS;
-/// Number of samples from which the phase of a grid is chosen.
-const FITTED: usize = 1 << 20;
 /// Distance from the first sample, in cells, beyond which the phase is not determined.
 const FARTHEST_PLACE: f64 = (1 << 28) as f64;
 /// Number of changes of the cell between neighbouring samples that together cost about a byte.
@@ -69,7 +68,7 @@ impl Grid {
     pub(crate) fn decimal(samples: &[f64], delta: f64) -> Option<Self> {
         let decimals = (0..DECIMALS).find(|decimals| {
             let ten = TENS[usize::from(*decimals)];
-            samples.iter().all(|x| digits(*x, ten).is_some())
+            crate::plain::have_digits(samples, ten)
         })?;
         let ten = TENS[usize::from(decimals)];
         let width = Self::width(delta, ten)?;
@@ -146,7 +145,7 @@ impl Grid {
     }
 
     /// The grid moved so that neighbouring samples are most often in one cell, if that saves more than the byte for the phase.
-    pub(crate) fn fitted(self, samples: &[f64]) -> Self {
+    pub(crate) fn fitted(self, samples: &[f64], effort: Effort) -> Self {
         let phases = f64::from(PHASES);
         let (scale, offset) = match self {
             // Half a digit from the next cell, so that rounding cannot move a sample there.
@@ -157,13 +156,18 @@ impl Grid {
             Self::Line { anchor, step, .. } => (phases / step, phases * (0.5 - anchor / step)),
             _ => return self,
         };
+        // Number of samples from which the phase is chosen.
+        let most = match effort {
+            Effort::Thorough => 1 << 20,
+            Effort::Fast => 1 << 13,
+        };
         // Under phase `p` a sample is in cell `(place - p) / 16`, rounded down: for each phase, how often the cell changes.
         let crossings = vectorised_narrow(
             #[inline(always)]
             || {
                 let mut crossings = [0_u32; PHASES as usize];
                 let (mut last, mut origin) = (0, None);
-                for sample in samples.iter().take(FITTED).filter(|sample| sample.is_finite()) {
+                for sample in samples.iter().take(most).filter(|sample| sample.is_finite()) {
                     let place = sample * scale + offset;
                     let origin = *origin.get_or_insert_with(|| (place / phases).floor() * phases);
                     // Shifted to positive numbers, for which a conversion rounds down.
@@ -316,7 +320,8 @@ impl Grid {
                 near.checked_add(shortest)
             }
         }
-        .filter(|index| index.abs() <= crate::rows::LARGEST)
+        // The field of the first index has no room for the other end.
+        .filter(|index| (-crate::rows::LARGEST..crate::rows::LARGEST).contains(index))
     }
 
     /// Writes what the reader needs besides the configuration.

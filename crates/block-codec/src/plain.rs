@@ -1,6 +1,6 @@
 //! The indices of whole columns that lie on their grid, by vector instructions.
 
-use crate::grid::{Grid, PHASES, WHOLE};
+use crate::grid::{Grid, LARGEST_DIGITS, PHASES, WHOLE};
 use crate::vectors::vectorised;
 use fewbits_node::adaptive::TENS;
 
@@ -21,40 +21,62 @@ fn whole(x: f64) -> i64 {
     ((x + SHIFT).to_bits() as i64).wrapping_sub(SHIFT.to_bits() as i64)
 }
 
+/// Number of samples that are looked at before the loop may end.
+const AT_ONCE: usize = 64;
+
+/// Whether every sample is a whole number divided by `ten`, to the last bit.
+pub(crate) fn have_digits(samples: &[f64], ten: f64) -> bool {
+    vectorised(
+        #[inline(always)]
+        || {
+            samples.chunks(AT_ONCE).all(|samples| {
+                samples.iter().fold(true, |all, sample| {
+                    let whole = rounded(sample * ten);
+                    all & (whole.abs() < LARGEST_DIGITS) & ((whole / ten).to_bits() == sample.to_bits())
+                })
+            })
+        },
+    )
+}
+
 impl Grid {
     /// The indices of samples on a line that all have one, of moderate size: with arithmetic that is exact in doubles and can be vectorised.
     /// They are those of [`index`](Self::index). `None` if a sample has none, or for other grids.
     pub(crate) fn plain_indices(&self, samples: &[f64], is_within: impl Fn(f64, f64) -> bool) -> Option<Vec<i64>> {
-        let (limit, mut indices, mut all) = (WHOLE as f64 / 8.0, vec![0; samples.len()], true);
-        let own = *self;
-        vectorised(
+        let (limit, mut indices) = (WHOLE as f64 / 8.0, vec![0; samples.len()]);
+        let (own, found) = (*self, indices.as_mut_slice());
+        let all = vectorised(
             #[inline(always)]
-            || match own {
+            move || match own {
                 Self::Decimal { decimals, width, phase } => {
                     let moved = Self::digits_moved(width, phase);
                     let twice_moved = (width - 1).wrapping_add(2 * moved) as f64;
                     let (width, moved, ten) = (width as f64, moved as f64, TENS[usize::from(decimals)]);
-                    for (index, sample) in indices.iter_mut().zip(samples) {
+                    let mut all = true;
+                    for (index, sample) in found.iter_mut().zip(samples) {
                         let digits = rounded(sample * ten) - moved;
                         // Exact: a quotient that is not whole is farther from the next whole number than it is rounded.
                         let cell = (digits / width).floor();
                         let value = 0.5 * (2.0 * width * cell + twice_moved) / ten;
                         // Middles must be exact too.
-                        let is_exact = digits.abs() < limit && (cell * width).abs() < limit && twice_moved < limit;
-                        all &= is_exact & (cell.abs() <= LARGEST_INDEX) & is_within(value, *sample);
+                        let is_exact = (digits.abs() < limit) & ((cell * width).abs() < limit) & (twice_moved < limit);
+                        all &= is_exact & (cell.abs() < LARGEST_INDEX) & is_within(value, *sample);
                         *index = whole(cell);
                     }
+                    all
                 }
                 Self::Line { anchor, step, phase } => {
                     let moved = f64::from(phase) / f64::from(PHASES);
-                    for (index, sample) in indices.iter_mut().zip(samples) {
+                    let mut all = true;
+                    for (index, sample) in found.iter_mut().zip(samples) {
                         let cell = rounded((sample - anchor) / step - moved);
                         let value = (anchor + step * (cell + moved)).clamp(f64::MIN, f64::MAX);
                         all &= (cell.abs() < LARGEST_INDEX) & is_within(value, *sample);
                         *index = whole(cell);
                     }
+                    all
                 }
-                _ => all = false,
+                _ => false,
             },
         );
         all.then_some(indices)

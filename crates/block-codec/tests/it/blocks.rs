@@ -236,7 +236,7 @@ fn blocks_are_the_same_bytes_everywhere() {
     let samples: Vec<f64> = (0..4000_u32)
         .map(|n| f64::from(n % 50) + f64::from((n.wrapping_mul(2_654_435_761) >> 28) % 5) * 0.25)
         .collect();
-    let expected = [(557, 0x3928_33fc_0bf1_2522), (1422, 0x70d2_7ba8_59af_472d)];
+    let expected = [(557, 0x3928_33fc_0bf1_2522), (1049, 0x0eaf_80c7_651a_b0b8)];
     for (effort, expected) in EFFORTS.into_iter().zip(expected) {
         let codec = BlockCodec::new(0.3).unwrap().with_effort(effort);
         let bytes = codec.encode(&samples).unwrap();
@@ -244,6 +244,20 @@ fn blocks_are_the_same_bytes_everywhere() {
             .iter()
             .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
         assert_eq!((bytes.len(), digest), expected, "{effort:?}");
+    }
+}
+
+/// Indices of `2^46` in size, the largest: as the first of a block the positive one was not decodable.
+#[test]
+fn largest_indices_return() {
+    for sample in [2.0_f64.powi(46), -2.0_f64.powi(46), 2.0_f64.powi(46) - 1.0] {
+        for codec in [BlockCodec::lossless(), BlockCodec::new(0.4).unwrap()] {
+            for effort in EFFORTS {
+                let samples = [sample, sample, 3.0, sample];
+                let bytes = codec.with_effort(effort).encode(&samples).unwrap();
+                assert_eq!(codec.decode(&bytes, 4).unwrap(), samples);
+            }
+        }
     }
 }
 
