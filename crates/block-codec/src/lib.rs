@@ -28,7 +28,7 @@
 //! | indices | the rest | models: 6 bits length (48 more if contexts have the lengths of rests: of blocks of 1024 rows or more, where the length is below 16) and as many bits of the first index (zigzag), then decisions (`model.rs`), all arithmetic coded; counts: the same with a bit behind the first index (1: differences of differences) and other decisions (`counts.rs`); tables: module `tables`; levels: module `levels`; pco: its standalone or, as written since version 6 of recordings, its wrapped format with one chunk and one page |
 //!
 //! There is no checksum, no length and no number of rows: the container must store all three. An arithmetic code has no redundancy, so most
-//! truncated or damaged blocks decode to wrong samples. Trailing bytes are detected and refused.
+//! truncated or damaged blocks decode to wrong samples. Trailing bytes are detected and refused (behind tables, from eight on, nearly always).
 
 pub mod arithmetic;
 pub mod bytes;

@@ -5,7 +5,7 @@
 //! own (module `words`): a processor works on all four at once.
 //!
 //! ```text
-//! 8 w + p varint          w: bytes of the arithmetic code; p: pads
+//! 32 w + 8 m + p varint   w: bytes of the arithmetic code; m: number of words modulo 4; p: pads
 //! w bytes                 arithmetic code: first index and second differences or not, as in counts; k (6 bits); WARM differences by counts
 //! 4 x 4 bytes             states of the lanes, little-endian
 //! words of 2 bytes        little-endian, as the lanes need them
@@ -55,8 +55,10 @@ const SIZE_BITS: u32 = 3;
 /// Largest number of low bits: differences of differences are at most `2^48` in size.
 const MOST_LOW: u32 = 48 - SIZE_BITS;
 const LOW_FIELD: u32 = 6;
-/// Bits of the number of pads: words of three lanes and the state of the first one.
+/// Bits of the number of pads (words of three lanes and the state of the first one), and of that and the number of words modulo 4. Without
+/// the latter, a word too many or too few is rarely taken for a part of other rows.
 const PAD_BITS: u32 = 3;
+const HEAD_BITS: u32 = PAD_BITS + 2;
 
 /// Number of rows of the tail at least.
 fn tail_rows(rows: usize, warm_bytes: usize) -> usize {
@@ -126,7 +128,8 @@ pub(crate) fn write(indices: &[i64], mut bytes: Vec<u8>) -> Result<Vec<u8>, Dama
         || steps(learned, rest, low, tail),
     );
     let (states, words, pads) = steps.encoded(tail_from);
-    push_varint(&mut bytes, (warm.len() as u64) << PAD_BITS | pads);
+    let head = (words.len() as u64 % 4) << PAD_BITS | pads;
+    push_varint(&mut bytes, (warm.len() as u64) << HEAD_BITS | head);
     bytes.extend_from_slice(&warm);
     bytes.extend(states.iter().flat_map(|state| state.to_le_bytes()));
     bytes.extend(words.iter().rev().flat_map(|word| word.to_le_bytes()));
@@ -166,7 +169,7 @@ pub(crate) fn read(bytes: &[u8], rows: usize) -> Result<Vec<i64>, Damaged> {
     }
     let mut bytes = Bytes(bytes);
     let head = bytes.varint()?;
-    let warm = bytes.take(usize::try_from(head >> PAD_BITS).unwrap_or(usize::MAX))?;
+    let warm = bytes.take(usize::try_from(head >> HEAD_BITS).unwrap_or(usize::MAX))?;
     let mut reader = Reader::new(warm);
     let (first, rests) = code_first(&mut reader, None, false)?;
     let second = reader.raw(0, 1) == 1;
@@ -180,6 +183,7 @@ pub(crate) fn read(bytes: &[u8], rows: usize) -> Result<Vec<i64>, Damaged> {
         second,
         low,
         pads: head & ((1 << PAD_BITS) - 1),
+        words: head >> PAD_BITS & 3,
         tail: tail_rows(rows - 1 - WARM, warm.len()),
     };
     if low == 0 {
@@ -194,6 +198,8 @@ struct Head {
     second: bool,
     low: u32,
     pads: u64,
+    /// Number of words modulo 4.
+    words: u64,
     tail: usize,
 }
 
@@ -213,6 +219,9 @@ impl Head {
             *state = u32::from_le_bytes(bytes.array()?);
         }
         let (words, odd) = bytes.0.as_chunks();
+        if !odd.is_empty() || words.len() as u64 % 4 != self.words {
+            return Err(cut_off());
+        }
         let mut words = Words::new(words);
         let mut tables = Tables::learned::<true>(&learned, self.low);
         let mut found = [0; LANES * STRETCH];
@@ -230,7 +239,7 @@ impl Head {
             push_indices(&mut indices, &mut differences, found)?;
         }
         let (first, others) = (states[0], &states[1..]);
-        if !odd.is_empty() || others.iter().any(|state| *state >= 2 * LOW) {
+        if others.iter().any(|state| *state >= 2 * LOW) {
             return Err(cut_off());
         }
         let late = words.behind(others.iter().map(|state| *state as u16));
