@@ -2,11 +2,11 @@
 
 use crate::Effort;
 use crate::bytes::{push_varint, zigzag};
-use crate::vectors::vectorised_narrow;
+use crate::vectors::{rounded, vectorised, vectorised_narrow};
 use fewbits_node::adaptive::TENS;
 
 /// Largest sample as a decimal integer: sums of two are exact doubles.
-pub(crate) const LARGEST_DIGITS: f64 = (1_u64 << 51) as f64;
+const LARGEST_DIGITS: f64 = (1_u64 << 51) as f64;
 /// Largest sample of single precision as a decimal integer: beyond that neighbours are the same number.
 const LARGEST_SINGLE_DIGITS: f64 = (1_u64 << 24) as f64;
 /// Integers up to this size are exact doubles.
@@ -48,6 +48,24 @@ fn digits(sample: f64, ten: f64) -> Option<i64> {
     (whole.abs() < LARGEST_DIGITS && (whole / ten).to_bits() == sample.to_bits()).then_some(whole as i64)
 }
 
+/// Number of samples that are looked at before the loop may end.
+const AT_ONCE: usize = 64;
+
+/// Whether every sample is a whole number divided by `ten`, to the last bit.
+fn have_digits(samples: &[f64], ten: f64) -> bool {
+    vectorised(
+        #[inline(always)]
+        || {
+            samples.chunks(AT_ONCE).all(|samples| {
+                samples.iter().fold(true, |all, sample| {
+                    let whole = rounded(sample * ten);
+                    all & (whole.abs() < LARGEST_DIGITS) & ((whole / ten).to_bits() == sample.to_bits())
+                })
+            })
+        },
+    )
+}
+
 /// The integer `digits` with `sample == digits / ten` rounded to single precision, if there is one.
 #[inline(always)]
 fn single_digits(sample: f64, ten: f64) -> Option<i64> {
@@ -68,7 +86,7 @@ impl Grid {
     pub(crate) fn decimal(samples: &[f64], delta: f64) -> Option<Self> {
         let decimals = (0..DECIMALS).find(|decimals| {
             let ten = TENS[usize::from(*decimals)];
-            crate::plain::have_digits(samples, ten)
+            have_digits(samples, ten)
         })?;
         let ten = TENS[usize::from(decimals)];
         let width = Self::width(delta, ten)?;

@@ -1,7 +1,7 @@
 //! The indices of whole columns that lie on their grid, by vector instructions.
 
-use crate::grid::{Grid, LARGEST_DIGITS, PHASES, WHOLE};
-use crate::vectors::vectorised;
+use crate::grid::{Grid, PHASES, WHOLE};
+use crate::vectors::{rounded, vectorised};
 use fewbits_node::adaptive::TENS;
 
 /// Largest index.
@@ -9,34 +9,10 @@ const LARGEST_INDEX: f64 = crate::rows::LARGEST as f64;
 /// In doubles of this size the last bit is a one.
 const SHIFT: f64 = 1.5 * (1_u64 << 52) as f64;
 
-/// The nearest whole number, of two the one farther from zero, as `f64::round`, in instructions that exist for vectors.
-#[inline(always)]
-fn rounded(x: f64) -> f64 {
-    (x + 0.499_999_999_999_999_94_f64.copysign(x)).trunc()
-}
-
 /// A whole number of at most `2^51` in size as an integer; any other gives any integer.
 #[inline(always)]
 fn whole(x: f64) -> i64 {
     ((x + SHIFT).to_bits() as i64).wrapping_sub(SHIFT.to_bits() as i64)
-}
-
-/// Number of samples that are looked at before the loop may end.
-const AT_ONCE: usize = 64;
-
-/// Whether every sample is a whole number divided by `ten`, to the last bit.
-pub(crate) fn have_digits(samples: &[f64], ten: f64) -> bool {
-    vectorised(
-        #[inline(always)]
-        || {
-            samples.chunks(AT_ONCE).all(|samples| {
-                samples.iter().fold(true, |all, sample| {
-                    let whole = rounded(sample * ten);
-                    all & (whole.abs() < LARGEST_DIGITS) & ((whole / ten).to_bits() == sample.to_bits())
-                })
-            })
-        },
-    )
 }
 
 impl Grid {
