@@ -3,10 +3,10 @@
 use crate::bytes::{Bytes, unzigzag};
 use crate::error::Damaged;
 use crate::grid::{DECIMALS, Grid, PHASES};
-use crate::head::{CIRCLE, Coding, Head, LINE, SAMPLES, SINGLE, WRAPPED};
+use crate::head::{CIRCLE, Coding, Head, LINE, SAMPLES, SINGLE, TABLED, WRAPPED};
 use crate::indices::{from_pco_bytes, from_wrapped_pco, raw_samples, read_block};
 use crate::rows::Others;
-use crate::{Accuracy, BlockCodec, Error, check_rows, levels};
+use crate::{Accuracy, BlockCodec, Error, check_rows, levels, tables};
 
 impl BlockCodec {
     /// The samples of a block of `rows` rows.
@@ -56,6 +56,7 @@ impl BlockCodec {
             }
             Coding::Wrapped => from_wrapped_pco::<i64>(rest, rows)?,
             Coding::Counts => read_block(rest, false, &grid, rows, None)?,
+            Coding::Tables => tables::read(rest, rows)?,
             _ => from_pco_bytes::<i64>(rest, rows)?,
         };
         let mut samples = grid.values(&indices);
@@ -109,18 +110,19 @@ impl BlockCodec {
             _ => return Err(Damaged::new("head", head, "a grid and a coding that belong together")),
         };
         let [second] = if head & 128 == 0 { [0] } else { bytes.array()? };
-        let (is_single, is_wrapped) = (second & SINGLE != 0, second & WRAPPED != 0);
-        if second > 63
+        let [is_single, is_wrapped, is_tabled] = [SINGLE, WRAPPED, TABLED].map(|flag| second & flag != 0);
+        if second > 127
             || (head & 128 != 0 && second == 0)
             || (kind == SAMPLES && head & 128 != 0)
             || (kind == SAMPLES && head & 64 != 0 && coding != Coding::Levels)
             || (is_single && (second & 2 == 0 || kind >= DECIMALS))
             || (is_wrapped && coding != Coding::Pco)
+            || (is_tabled && coding != Coding::Counts)
         {
             return Err(Damaged::new(
                 "second byte",
                 second,
-                "exceptions, steps, an anchor or a phase, and a grid that has them",
+                "exceptions, steps, an anchor or a phase, and a grid or coding that has them",
             ));
         }
         let grid = match (kind, self.accuracy) {
@@ -140,7 +142,11 @@ impl BlockCodec {
             (CIRCLE, Accuracy::Within { .. }) => Some(self.circle()?),
             _ => return Err(Damaged::new("grid", kind, "one of the agreed accuracy")),
         };
-        let coding = if is_wrapped { Coding::Wrapped } else { coding };
+        let coding = match coding {
+            Coding::Pco if is_wrapped => Coding::Wrapped,
+            Coding::Counts if is_tabled => Coding::Tables,
+            coding => coding,
+        };
         let grid = grid.map(|grid| if is_single { grid.rounded_to_single() } else { grid });
         let grid = match grid {
             Some(grid) if second & 8 != 0 => Some(read_phase(grid, bytes)?),

@@ -4,6 +4,7 @@ use crate::grid::Grid;
 use crate::head::{Coding, SAMPLES, write_head};
 use crate::indices::{smallest_pco, write_block};
 use crate::rows::Others;
+use crate::tables::{self, TABLES_ROWS};
 use crate::vectors::vectorised;
 use crate::{Accuracy, BlockCodec, Effort, Error, check_rows, levels};
 
@@ -12,7 +13,10 @@ const ANCHORED_ROWS: usize = 1024;
 /// Bits per sample above which pco, and the samples themselves, are tried besides the models.
 pub(crate) const FINE: usize = 2;
 pub(crate) const FINE_IF_FAST: usize = 4;
+const FINE_IF_TABLED: usize = 5;
 const VERY_FINE: usize = 6;
+/// Quarters of a bit per sample up to which counts are tried besides tables: they may be shorter, and are fast.
+const SPARSE_QUARTERS: usize = 3;
 /// Bits per sample up to which only the first grid is tried.
 const FEW: usize = 1;
 
@@ -94,14 +98,32 @@ impl BlockCodec {
             bytes
         };
         let mut shortest = Shortest::default();
-        shortest.keep(write_block(thorough, grid, &indices, &exceptions, None)?);
+        let is_tabled = self.is_tabled(samples.len());
+        if is_tabled {
+            shortest.keep(tables::write(&indices, head(Coding::Tables, false))?);
+        }
+        let is_sparse = |best: &Shortest| {
+            best.0
+                .as_ref()
+                .is_none_or(|b| 4 * b.len() <= SPARSE_QUARTERS * samples.len() / 8)
+        };
+        if is_sparse(&shortest) {
+            shortest.keep(write_block(thorough, grid, &indices, &exceptions, None)?);
+        }
         if others.is_some() {
             shortest.keep(write_block(true, grid, &indices, &exceptions, others)?);
         }
         let is_above =
             |bits: usize, best: &Shortest| best.0.as_ref().is_none_or(|b| b.len() > bits * samples.len() / 8);
         // On coarse grids the models need far fewer bits. Try the general coder only if a sample takes many bits.
-        let is_fine = is_above(if thorough { FINE } else { FINE_IF_FAST }, &shortest);
+        let fine = if thorough {
+            FINE
+        } else if is_tabled {
+            FINE_IF_TABLED
+        } else {
+            FINE_IF_FAST
+        };
+        let is_fine = is_above(fine, &shortest);
         if thorough || is_fine {
             let keys: Vec<u64> = indices.iter().map(|index| levels::key_of_index(*index)).collect();
             if let Some(found) = levels::levels(&keys) {
@@ -120,6 +142,11 @@ impl BlockCodec {
         Ok(())
     }
 
+    /// Whether blocks of so many rows are coded by tables.
+    pub(crate) fn is_tabled(&self, rows: usize) -> bool {
+        self.effort == Effort::Fast && rows >= TABLES_ROWS
+    }
+
     /// The grids that are tried; none if only the samples' own bits fit.
     fn grids(&self, samples: &[f64]) -> Vec<Grid> {
         let mut grids: Vec<Grid> = self.grid(samples).into_iter().collect();
@@ -132,7 +159,7 @@ impl BlockCodec {
         {
             grids.extend(Grid::decimal(samples, delta));
         }
-        grids.iter().map(|grid| grid.fitted(samples)).collect()
+        grids.iter().map(|grid| grid.fitted(samples, self.effort)).collect()
     }
 
     /// The grid that fits the samples; `None` if only their own bits do.
@@ -179,7 +206,14 @@ impl BlockCodec {
 
     /// The indices (an exception repeats the last one), and the exceptions with their rows.
     pub(crate) fn indices(&self, grid: &Grid, samples: &[f64]) -> (Vec<i64>, Vec<(usize, f64)>) {
-        if let Some(indices) = grid.plain_indices(samples, |value, sample| self.is_within(value, sample)) {
+        let plain = match self.accuracy {
+            // Without a circle the loop has no branch and is vectorised.
+            Accuracy::Within { delta, period: None } => {
+                grid.plain_indices(samples, |value, sample| (value - sample).abs() <= delta)
+            }
+            _ => grid.plain_indices(samples, |value, sample| self.is_within(value, sample)),
+        };
+        if let Some(indices) = plain {
             return (indices, Vec::new());
         }
         let mut exceptions = Vec::new();

@@ -1,7 +1,8 @@
 //! The grid of a block's reconstructions: conversion between samples and integers.
 
+use crate::Effort;
 use crate::bytes::{push_varint, zigzag};
-use crate::vectors::vectorised_narrow;
+use crate::vectors::{rounded, vectorised, vectorised_narrow};
 use fewbits_node::adaptive::TENS;
 
 /// Largest sample as a decimal integer: sums of two are exact doubles.
@@ -17,8 +18,6 @@ const LARGEST_CIRCLE: f64 = (1_u64 << 40) as f64;
 /// A grid can be moved by multiples of `2^-PHASE_BITS` of a cell.
 const PHASE_BITS: u32 = 4;
 pub(crate) const PHASES: u8 = 1 << PHASE_BITS;
-/// Number of samples from which the phase of a grid is chosen.
-const FITTED: usize = 1 << 20;
 /// Distance from the first sample, in cells, beyond which the phase is not determined.
 const FARTHEST_PLACE: f64 = (1 << 28) as f64;
 /// Number of changes of the cell between neighbouring samples that together cost about a byte.
@@ -49,6 +48,24 @@ fn digits(sample: f64, ten: f64) -> Option<i64> {
     (whole.abs() < LARGEST_DIGITS && (whole / ten).to_bits() == sample.to_bits()).then_some(whole as i64)
 }
 
+/// Number of samples that are looked at before the loop may end.
+const AT_ONCE: usize = 64;
+
+/// Whether every sample is a whole number divided by `ten`, to the last bit.
+fn have_digits(samples: &[f64], ten: f64) -> bool {
+    vectorised(
+        #[inline(always)]
+        || {
+            samples.chunks(AT_ONCE).all(|samples| {
+                samples.iter().fold(true, |all, sample| {
+                    let whole = rounded(sample * ten);
+                    all & (whole.abs() < LARGEST_DIGITS) & ((whole / ten).to_bits() == sample.to_bits())
+                })
+            })
+        },
+    )
+}
+
 /// The integer `digits` with `sample == digits / ten` rounded to single precision, if there is one.
 #[inline(always)]
 fn single_digits(sample: f64, ten: f64) -> Option<i64> {
@@ -69,7 +86,7 @@ impl Grid {
     pub(crate) fn decimal(samples: &[f64], delta: f64) -> Option<Self> {
         let decimals = (0..DECIMALS).find(|decimals| {
             let ten = TENS[usize::from(*decimals)];
-            samples.iter().all(|x| digits(*x, ten).is_some())
+            have_digits(samples, ten)
         })?;
         let ten = TENS[usize::from(decimals)];
         let width = Self::width(delta, ten)?;
@@ -146,7 +163,7 @@ impl Grid {
     }
 
     /// The grid moved so that neighbouring samples are most often in one cell, if that saves more than the byte for the phase.
-    pub(crate) fn fitted(self, samples: &[f64]) -> Self {
+    pub(crate) fn fitted(self, samples: &[f64], effort: Effort) -> Self {
         let phases = f64::from(PHASES);
         let (scale, offset) = match self {
             // Half a digit from the next cell, so that rounding cannot move a sample there.
@@ -157,13 +174,18 @@ impl Grid {
             Self::Line { anchor, step, .. } => (phases / step, phases * (0.5 - anchor / step)),
             _ => return self,
         };
+        // Number of samples from which the phase is chosen.
+        let most = match effort {
+            Effort::Thorough => 1 << 20,
+            Effort::Fast => 1 << 13,
+        };
         // Under phase `p` a sample is in cell `(place - p) / 16`, rounded down: for each phase, how often the cell changes.
         let crossings = vectorised_narrow(
             #[inline(always)]
             || {
                 let mut crossings = [0_u32; PHASES as usize];
                 let (mut last, mut origin) = (0, None);
-                for sample in samples.iter().take(FITTED).filter(|sample| sample.is_finite()) {
+                for sample in samples.iter().take(most).filter(|sample| sample.is_finite()) {
                     let place = sample * scale + offset;
                     let origin = *origin.get_or_insert_with(|| (place / phases).floor() * phases);
                     // Shifted to positive numbers, for which a conversion rounds down.
@@ -316,7 +338,8 @@ impl Grid {
                 near.checked_add(shortest)
             }
         }
-        .filter(|index| index.abs() <= crate::rows::LARGEST)
+        // The field of the first index has no room for the other end.
+        .filter(|index| (-crate::rows::LARGEST..crate::rows::LARGEST).contains(index))
     }
 
     /// Writes what the reader needs besides the configuration.

@@ -8,9 +8,10 @@ pub(crate) const LINE: u8 = 13;
 pub(crate) const CIRCLE: u8 = 14;
 pub(crate) const SAMPLES: u8 = 15;
 
-/// Flags of the second byte: decimals are rounded to single precision; pco is in its wrapped form.
+/// Flags of the second byte: decimals are rounded to single precision; pco is in its wrapped form; tables follow the counts.
 pub(crate) const SINGLE: u8 = 16;
 pub(crate) const WRAPPED: u8 = 32;
+pub(crate) const TABLED: u8 = 64;
 
 /// How the indices are coded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,6 +20,8 @@ pub(crate) enum Coding {
     Pco,
     Raw,
     Counts,
+    /// Counts, then tables of symbols.
+    Tables,
     /// A list of levels, and their numbers.
     Levels,
     /// pco in its wrapped form.
@@ -41,16 +44,16 @@ pub(crate) fn write_head(grid: &Grid, coding: Coding, joint: bool, exceptions: &
         Grid::Line { anchor, .. } => (LINE, if *anchor == 0.0 { 0 } else { 4 }),
         Grid::Circle { .. } => (CIRCLE, 0),
     };
-    let coding_is_wrapped = coding == Coding::Wrapped;
-    let coding = match coding {
-        Coding::Models => 0,
-        Coding::Pco | Coding::Wrapped => 1,
-        Coding::Raw | Coding::Levels => 2,
-        Coding::Counts => 3,
+    let (coding, form) = match coding {
+        Coding::Models => (0, 0),
+        Coding::Pco => (1, 0),
+        Coding::Wrapped => (1, WRAPPED),
+        Coding::Raw | Coding::Levels => (2, 0),
+        Coding::Counts => (3, 0),
+        Coding::Tables => (3, TABLED),
     };
     let moved = if grid.phase() == 0 { 0 } else { 8 };
-    let wrapped = if coding_is_wrapped { WRAPPED } else { 0 };
-    let second = own | moved | wrapped | u8::from(!exceptions.is_empty());
+    let second = own | moved | form | u8::from(!exceptions.is_empty());
     bytes.push(kind | coding << 4 | u8::from(joint) << 6 | u8::from(second != 0) << 7);
     if second != 0 {
         bytes.push(second);

@@ -26,7 +26,7 @@ const WITH_RESTS: u32 = 48;
 pub(crate) const RESTS_ROWS: usize = 1024;
 
 /// Codes the first index of a block that has no [`Start`](crate::Start), and whether contexts have the lengths of rests.
-fn code_first<C: Coder>(coder: &mut C, wanted: Option<i64>, rests: bool) -> Result<(i64, bool), Damaged> {
+pub(crate) fn code_first<C: Coder>(coder: &mut C, wanted: Option<i64>, rests: bool) -> Result<(i64, bool), Damaged> {
     let z = wanted.map_or(0, zigzag);
     let length = u64::BITS - z.leading_zeros();
     let told = if rests && length < (1 << FIRST_LENGTH) - WITH_RESTS {

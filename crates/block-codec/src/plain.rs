@@ -1,19 +1,13 @@
 //! The indices of whole columns that lie on their grid, by vector instructions.
 
 use crate::grid::{Grid, PHASES, WHOLE};
-use crate::vectors::vectorised;
+use crate::vectors::{rounded, vectorised};
 use fewbits_node::adaptive::TENS;
 
 /// Largest index.
 const LARGEST_INDEX: f64 = crate::rows::LARGEST as f64;
 /// In doubles of this size the last bit is a one.
 const SHIFT: f64 = 1.5 * (1_u64 << 52) as f64;
-
-/// The nearest whole number, of two the one farther from zero, as `f64::round`, in instructions that exist for vectors.
-#[inline(always)]
-fn rounded(x: f64) -> f64 {
-    (x + 0.499_999_999_999_999_94_f64.copysign(x)).trunc()
-}
 
 /// A whole number of at most `2^51` in size as an integer; any other gives any integer.
 #[inline(always)]
@@ -25,36 +19,40 @@ impl Grid {
     /// The indices of samples on a line that all have one, of moderate size: with arithmetic that is exact in doubles and can be vectorised.
     /// They are those of [`index`](Self::index). `None` if a sample has none, or for other grids.
     pub(crate) fn plain_indices(&self, samples: &[f64], is_within: impl Fn(f64, f64) -> bool) -> Option<Vec<i64>> {
-        let (limit, mut indices, mut all) = (WHOLE as f64 / 8.0, vec![0; samples.len()], true);
-        let own = *self;
-        vectorised(
+        let (limit, mut indices) = (WHOLE as f64 / 8.0, vec![0; samples.len()]);
+        let (own, found) = (*self, indices.as_mut_slice());
+        let all = vectorised(
             #[inline(always)]
-            || match own {
+            move || match own {
                 Self::Decimal { decimals, width, phase } => {
                     let moved = Self::digits_moved(width, phase);
                     let twice_moved = (width - 1).wrapping_add(2 * moved) as f64;
                     let (width, moved, ten) = (width as f64, moved as f64, TENS[usize::from(decimals)]);
-                    for (index, sample) in indices.iter_mut().zip(samples) {
+                    let mut all = true;
+                    for (index, sample) in found.iter_mut().zip(samples) {
                         let digits = rounded(sample * ten) - moved;
                         // Exact: a quotient that is not whole is farther from the next whole number than it is rounded.
                         let cell = (digits / width).floor();
                         let value = 0.5 * (2.0 * width * cell + twice_moved) / ten;
                         // Middles must be exact too.
-                        let is_exact = digits.abs() < limit && (cell * width).abs() < limit && twice_moved < limit;
-                        all &= is_exact & (cell.abs() <= LARGEST_INDEX) & is_within(value, *sample);
+                        let is_exact = (digits.abs() < limit) & ((cell * width).abs() < limit) & (twice_moved < limit);
+                        all &= is_exact & (cell.abs() < LARGEST_INDEX) & is_within(value, *sample);
                         *index = whole(cell);
                     }
+                    all
                 }
                 Self::Line { anchor, step, phase } => {
                     let moved = f64::from(phase) / f64::from(PHASES);
-                    for (index, sample) in indices.iter_mut().zip(samples) {
+                    let mut all = true;
+                    for (index, sample) in found.iter_mut().zip(samples) {
                         let cell = rounded((sample - anchor) / step - moved);
                         let value = (anchor + step * (cell + moved)).clamp(f64::MIN, f64::MAX);
                         all &= (cell.abs() < LARGEST_INDEX) & is_within(value, *sample);
                         *index = whole(cell);
                     }
+                    all
                 }
-                _ => all = false,
+                _ => false,
             },
         );
         all.then_some(indices)

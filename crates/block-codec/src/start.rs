@@ -114,7 +114,7 @@ impl BlockCodec {
             },
             grid => grid,
         }
-        .fitted(samples);
+        .fitted(samples, self.effort);
         let (mut indices, _) = self.indices(&grid, samples);
         // The median has the smallest mean distance from the indices.
         indices.sort_unstable();
@@ -180,12 +180,14 @@ impl BlockCodec {
         check_rows(samples.len(), others)?;
         let mut found: Vec<StartedBlock> = Vec::new();
         let (indices, exceptions) = self.indices(&start.grid, samples);
-        if exceptions.is_empty() && !samples.is_empty() {
+        let is_tabled = self.is_tabled(samples.len());
+        if exceptions.is_empty() && !samples.is_empty() && !is_tabled {
             found.push(self.started(start, &indices, None)?);
             if self.effort == Effort::Thorough && !others.is_empty() {
                 found.push(self.started(start, &indices, Some(&Others::new(others)))?);
             }
         }
+        // Tables are in blocks of their own only.
         let fine = match self.effort {
             Effort::Thorough => crate::encode::FINE,
             Effort::Fast => crate::encode::FINE_IF_FAST,
@@ -206,8 +208,11 @@ impl BlockCodec {
     }
 
     /// The samples as indices on the start's grid, for [`code_shared`](Self::code_shared). `None` if a block of its own may be shorter: a
-    /// sample is off the grid, another grid is better, or neighbours differ by many points.
+    /// sample is off the grid, another grid is better, or neighbours differ by many points; or if a block of its own is faster.
     pub fn indices_on(&self, start: &Start, samples: &[f64]) -> Option<Vec<i64>> {
+        if self.is_tabled(samples.len()) {
+            return None;
+        }
         let (indices, exceptions) = self.indices(&start.grid, samples);
         let bits = |pair: &[i64]| u64::from(u64::BITS - pair[0].abs_diff(pair[1]).leading_zeros());
         let sizes: u64 = indices.windows(2).map(bits).sum();

@@ -15,3 +15,9 @@ pub(crate) fn vectorised_narrow<R>(work: impl FnOnce() -> R) -> R {
     }
     work()
 }
+
+/// The nearest whole number, of two the one farther from zero, as `f64::round`, in instructions that exist for vectors.
+#[inline(always)]
+pub(crate) fn rounded(x: f64) -> f64 {
+    (x + 0.499_999_999_999_999_94_f64.copysign(x)).trunc()
+}

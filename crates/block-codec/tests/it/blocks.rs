@@ -236,7 +236,7 @@ fn blocks_are_the_same_bytes_everywhere() {
     let samples: Vec<f64> = (0..4000_u32)
         .map(|n| f64::from(n % 50) + f64::from((n.wrapping_mul(2_654_435_761) >> 28) % 5) * 0.25)
         .collect();
-    let expected = [(557, 0x3928_33fc_0bf1_2522), (1422, 0x70d2_7ba8_59af_472d)];
+    let expected = [(557, 0x3928_33fc_0bf1_2522), (1049, 0x7dbb_dfef_56a0_aeb4)];
     for (effort, expected) in EFFORTS.into_iter().zip(expected) {
         let codec = BlockCodec::new(0.3).unwrap().with_effort(effort);
         let bytes = codec.encode(&samples).unwrap();
@@ -244,6 +244,21 @@ fn blocks_are_the_same_bytes_everywhere() {
             .iter()
             .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
         assert_eq!((bytes.len(), digest), expected, "{effort:?}");
+    }
+}
+
+/// Indices about `2^46` in size, the largest, of which the positive one is an exception.
+#[test]
+fn largest_indices_return() {
+    for end in [2.0_f64.powi(46), -2.0_f64.powi(46)] {
+        let samples: Vec<f64> = (0..3000_u64).map(|i| end - (i * i % 7) as f64 * end.signum()).collect();
+        for rows in [1500, 3000] {
+            for effort in EFFORTS {
+                let codec = BlockCodec::lossless().with_effort(effort);
+                let bytes = codec.encode(&samples[..rows]).unwrap();
+                assert_eq!(codec.decode(&bytes, rows).unwrap(), samples[..rows]);
+            }
+        }
     }
 }
 

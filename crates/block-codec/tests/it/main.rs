@@ -7,3 +7,4 @@ mod blocks;
 mod common;
 mod golden;
 mod levels;
+mod tables;

@@ -28,10 +28,12 @@ pub(super) fn indices(
     column: usize,
     cells: &[Option<f64>],
     own: Option<f64>,
+    effort: Effort,
 ) -> Option<(Vec<i64>, Vec<f64>)> {
     let (start, target) = (header.start(column, own)?, header.target(column, own));
     let samples: Vec<f64> = cells.iter().flatten().copied().filter(|x| x.is_finite()).collect();
-    let indices = adaptive::codec(&target)?.indices_on(&start, &adaptive::prepared(&samples, &target))?;
+    let codec = adaptive::codec(&target)?.with_effort(effort);
+    let indices = codec.indices_on(&start, &adaptive::prepared(&samples, &target))?;
     let values = adaptive::restored(start.values(&indices), &target);
     let mut pairs = samples.iter().zip(&values);
     let holds = pairs.all(|(sample, value)| target.holds(*sample, *value));

@@ -37,7 +37,9 @@ fn encode_column(
     let target = header.target(column, own);
     let start = header.start(column, own);
     let mut specials: Specials = cells.iter().map(|cell| Special::of(*cell)).collect();
-    let shared = may_share.then(|| shared::indices(header, column, cells, own)).flatten();
+    let shared = may_share
+        .then(|| shared::indices(header, column, cells, own, effort))
+        .flatten();
     if let Some((indices, values)) = shared {
         return CodedColumn {
             descriptor: CodecId::Shared as u8,

@@ -120,6 +120,31 @@ fn columns_of_one_code_are_read_alone() {
     }
 }
 
+/// Blocks of 2048 rows and more have tables, each column by itself; the last one has counts, in a code that columns share.
+#[test]
+fn fast_recordings_of_many_rows_keep_all_promises() {
+    let truth = rows(5500);
+    let mut recorder = Recorder::new(Vec::new(), schema(2500, TimeBase::Numbered)).with_effort(Effort::Fast);
+    truth.iter().for_each(|row| recorder.push_next(row).unwrap());
+    let bytes = recorder.finish().unwrap();
+    let all = read(&bytes);
+    assert_eq!(all.len(), truth.len());
+    assert!(
+        all.iter()
+            .zip(&truth)
+            .all(|(row, sample)| row_holds(sample, &row.values))
+    );
+    let mut playback = Playback::new(Cursor::new(&bytes)).unwrap();
+    let last: Vec<_> = playback
+        .columns(&["count"])
+        .unwrap()
+        .range(4990, 5200)
+        .map(Result::unwrap)
+        .collect();
+    assert_eq!(last.len(), 211);
+    assert!(last.iter().all(|row| row.values[0] == truth[row.tick as usize][2]));
+}
+
 #[test]
 fn index_names_ends_outside_the_values() {
     let truth = rows(500);

@@ -1,0 +1,83 @@
+//! Blocks of many rows, written with `Effort::Fast`.
+
+use super::common::mixed;
+use fewbits_block_codec::{BlockCodec, Effort};
+use proptest::prelude::*;
+
+/// Codes with tables: bit 7 of the first byte says that a second one follows, whose bit 6 says so.
+fn is_tabled(bytes: &[u8]) -> bool {
+    bytes[0] & 0xb0 == 0xb0 && bytes[1] & 0x40 != 0
+}
+
+fn fast(delta: f64) -> BlockCodec {
+    BlockCodec::new(delta).unwrap().with_effort(Effort::Fast)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases.div_ceil(8), ..ProptestConfig::default() })]
+
+    #[test]
+    fn bound_holds_for_many_rows(seed in any::<u64>(), rows in 2000..5000_usize, exponent in -3..2_i32) {
+        let delta = 10.0_f64.powi(exponent);
+        let samples = mixed(seed, rows);
+        for codec in [fast(delta), fast(delta).on_circle(360.0).unwrap()] {
+            let on_circle = codec != fast(delta);
+            let start = codec.start(&samples[..100]).unwrap();
+            let started = codec.encode_from(&start, &samples, &[]).unwrap();
+            for values in [
+                codec.decode(&codec.encode(&samples).unwrap(), rows).unwrap(),
+                codec.decode_from(&start, &started.bytes, rows, &[]).unwrap(),
+            ] {
+                for (value, sample) in values.iter().zip(&samples) {
+                    let distance = (value - if on_circle { sample.rem_euclid(360.0) } else { *sample }).abs();
+                    let distance = if on_circle { distance.min(360.0 - distance) } else { distance };
+                    prop_assert!(distance <= delta);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn any_bytes_behind_a_head_of_tables_are_total(bytes in prop::collection::vec(any::<u8>(), 0..300), rows in 2048..9000_usize) {
+        let block = [&[0xb0 | 13, 0x40], bytes.as_slice()].concat();
+        if let Ok(values) = fast(0.1).decode(&block, rows) {
+            prop_assert_eq!(values.len(), rows);
+        }
+    }
+}
+
+#[test]
+fn blocks_of_many_rows_have_tables() {
+    let samples = mixed(3, 4000);
+    assert!(is_tabled(&fast(0.05).encode(&samples).unwrap()));
+    assert!(!is_tabled(&fast(0.05).encode(&samples[..2047]).unwrap()));
+    assert!(!is_tabled(&BlockCodec::new(0.05).unwrap().encode(&samples).unwrap()));
+    // Where few rows change, counts are shorter.
+    let rests: Vec<f64> = (0..4000).map(|row| f64::from(row / 400)).collect();
+    assert!(!is_tabled(&fast(0.05).encode(&rests).unwrap()));
+}
+
+#[test]
+fn damaged_tables_give_the_stated_rows_or_an_error() {
+    let samples = mixed(5, 2100);
+    let bytes = fast(0.05).encode(&samples).unwrap();
+    assert!(is_tabled(&bytes));
+    for flag in [0x80, 0x10, 0x20] {
+        let damaged = [&[bytes[0] ^ flag], &bytes[1..]].concat();
+        assert!(fast(0.05).decode(&damaged, 2100).is_err(), "{flag}");
+    }
+    let shortened = (0..bytes.len()).map(|end| bytes[..end].to_vec());
+    let flipped = (0..8 * bytes.len()).map(|bit| {
+        let mut flipped = bytes.clone();
+        flipped[bit / 8] ^= 1 << (bit % 8);
+        flipped
+    });
+    for damaged in shortened.chain(flipped) {
+        if let Ok(values) = fast(0.05).decode(&damaged, 2100) {
+            assert_eq!(values.len(), 2100);
+        }
+    }
+    for rows in [1, 2047, 2099, 2101, 1 << 40, usize::MAX] {
+        assert!(fast(0.05).decode(&bytes, rows).is_err(), "{rows}");
+    }
+}
