@@ -49,6 +49,8 @@ const COARSEST: f64 = 1.0;
 /// A grid is made finer so often at most, and covers some nodes beside those that matter.
 const PASSES: usize = 40;
 const BESIDE: usize = 2;
+/// Most nodes of the mixture of a narrow belief and a wide one.
+const MAX_MIXED: usize = 2000;
 
 /// Masses of equidistant nodes, of any sum.
 struct Masses {
@@ -152,6 +154,40 @@ impl Masses {
         }
         .cut(cut)
     }
+}
+
+/// The mixture of two beliefs, of which the first has this share. Its grid has the distance of the finer of the two, unless that takes too
+/// many nodes.
+pub(crate) fn mixed(one: &PointMass, other: &PointMass, share: f64) -> Result<PointMass, Error> {
+    let both = [(one, share), (other, 1.0 - share)];
+    let last = |belief: &PointMass| belief.grid().node(belief.density().len() - 1);
+    let first = one.grid().node(0).min(other.grid().node(0));
+    let span = last(one).max(last(other)) - first;
+    let finer = one.grid().spacing().min(other.grid().spacing());
+    let spacing = finer.max(span / MAX_MIXED as f64);
+    let mut masses = vec![0.0; (span / spacing).ceil() as usize + 2];
+    for (belief, share) in both {
+        let (grid, density) = (belief.grid(), belief.density());
+        if grid.spacing() < spacing {
+            // Each mass is shared by the two nodes beside it.
+            for (i, density) in density.iter().enumerate() {
+                let place = (grid.node(i) - first) / spacing;
+                let (below, mass) = (place.floor(), share * density * grid.spacing());
+                masses[below as usize] += mass * (1.0 - (place - below));
+                masses[below as usize + 1] += mass * (place - below);
+            }
+        } else {
+            // The density between nodes is a line from each to the next.
+            let (low, high) = (grid.node(0), last(belief));
+            for (i, mass) in masses.iter_mut().enumerate() {
+                let node = first + spacing * i as f64;
+                if (low..=high).contains(&node) {
+                    *mass += share * spacing * belief.log_density(&Vector1::new(node)).exp();
+                }
+            }
+        }
+    }
+    Masses { first, spacing, masses }.belief()
 }
 
 /// The Gaussian on a grid of its own width.

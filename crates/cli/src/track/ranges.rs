@@ -47,6 +47,9 @@ struct AnchorSummary {
     ranges: usize,
     /// Probability at the end that its ranges depend on the distance.
     works: f64,
+    /// The bias that it has alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    own_bias: Option<f64>,
 }
 
 /// The options of `ranges` that those of `track --model ranges` stand for.
@@ -188,6 +191,7 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
                 name: name.clone(),
                 ranges: 0,
                 works: 1.0,
+                own_bias: None,
             })
             .collect(),
     };
@@ -259,9 +263,10 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
     (summary.bits, summary.losses) = (tracker.bits(), tracker.losses());
     summary.bits_per_range = summary.bits as f64 / (summary.ranges as f64).max(1.0);
     for anchor in &mut summary.anchors {
-        anchor.works = tracker
+        let asked = tracker
             .works(&anchor.name)
-            .map_err(Error::refused("an anchor is refused"))?;
+            .and_then(|works| Ok((works, tracker.own_bias(&anchor.name)?)));
+        (anchor.works, anchor.own_bias) = asked.map_err(Error::refused("an anchor is refused"))?;
     }
     if summary.rows == 0 {
         return Err(Error::empty(instants.file(), "rows"));
@@ -318,6 +323,13 @@ fn lines(summary: &Summary, tracker: &RangeTracker, silence: f64) -> Vec<String>
             lines.push(format!("no range from anchor {}", anchor.name));
         } else if anchor.works < 0.5 {
             lines.push(format!("anchor {} contradicts the others and is not used", anchor.name));
+        } else if let Some(bias) = anchor.own_bias {
+            let off = if bias > 0.0 { "long" } else { "short" };
+            lines.push(format!(
+                "ranges of anchor {} are {} too {off}, as if it stood elsewhere or were behind a wall: they are used less that",
+                anchor.name,
+                short(bias.abs())
+            ));
         }
     }
     lines

@@ -98,9 +98,7 @@ impl World {
             _ => {
                 let (world, prior) = (|change| self.walk(change), &self.start(guess)?);
                 let level = Level { world, prior, period };
-                // Beside a stated noise far below the width of silence, the search on a grid finds changes that are half of the right ones.
-                let is_found = |noise: &Number| matches!(noise, Number::Unknown { .. });
-                if self.is_cut && noises.iter().any(is_found) {
+                if self.is_cut {
                     level.calibrate_on_grid(instants, change, noises)
                 } else {
                     level.calibrate(instants, change, noises)

@@ -28,6 +28,8 @@ const JUMP: u32 = 4;
 /// Steps of the search, in `ln`, and its reach about the start.
 const STEPS: [f64; 6] = [2.0, 1.0, 0.5, 0.25, 0.1, 0.03];
 const REACH: f64 = 9.0;
+/// How far the first scan of the change reaches.
+const SCANNED: i32 = 6;
 /// Rounds over the single numbers.
 const ROUNDS: usize = 3;
 /// A number is raised by these steps while the likelihood, which is as high (within so many nats) so far below, loses little.
@@ -191,6 +193,10 @@ where
             .filter(|axis| noises[axis - 1].is_unknown())
             .collect();
         let own_change: Vec<usize> = change.is_unknown().then_some(0).into_iter().collect();
+        // Where values that are sent seldom are all taken for wild, the likelihood has a second maximum.
+        if change.is_unknown() {
+            found.scan();
+        }
         found.improve(&[own_change.clone(), together.clone()], &STEPS);
         let single: Vec<Vec<usize>> = together
             .iter()
@@ -364,6 +370,19 @@ impl<L: Fn(f64, &[f64]) -> f64> Search<'_, L> {
         // What no reading depends on stays as it is.
         if by < REACH {
             self.shifts[axis] += by;
+        }
+    }
+
+    /// Begins at the best of some changes that are factors of e apart.
+    fn scan(&mut self) {
+        let start = self.shifts.clone();
+        for k in -SCANNED..=SCANNED {
+            let mut other = start.clone();
+            other[0] += f64::from(k);
+            let found = self.at(&other);
+            if found > self.best {
+                (self.best, self.shifts) = (found, other);
+            }
         }
     }
 

@@ -2,9 +2,18 @@
 
 use super::{Calibration, Instant, JUMP, Level, Number, Reading, WILD};
 use crate::Error;
-use crate::moving_grid::{QUICK, predicted, start, updated};
+use crate::moving_grid::{QUICK, mixed, predicted, start, updated};
 use fewbits_core::{Belief, Evolution, Gaussian, GaussianDynamics, Likelihood};
+use fewbits_densities::PointMass;
 use nalgebra::Vector1;
+
+/// A reading narrower than so many distances between nodes is taken in by itself: beside the chance that it is wild, the nodes do not show where the
+/// level is if it is right.
+const NARROW: f64 = 2.0;
+/// Standard deviation of what a node stands for, in distances between nodes: it is added to the noise of other readings, whose ends lie between nodes.
+const SMEARED: f64 = 0.289;
+/// The smaller of two shares of a mixture is left out below this.
+const NEGLIGIBLE: f64 = 1e-6;
 
 /// A reading of a level, which is wild with a small probability.
 struct Said<'a> {
@@ -15,14 +24,40 @@ struct Said<'a> {
 }
 
 impl Said<'_> {
-    fn right(&self, level: f64) -> f64 {
-        (1.0 - WILD) * self.reading.given(level, self.noise, self.period)
+    fn log_right(&self, level: f64) -> f64 {
+        (1.0 - WILD).ln() + self.reading.log_given(level, self.noise, self.period)
+    }
+
+    /// The belief after a reading that is narrow: that of a right reading on a grid as fine as it takes, and the belief before it.
+    fn narrow(&self, belief: PointMass) -> Result<(PointMass, f64), Error> {
+        let (right, log_right) = updated(&belief, &[&Right(self)], &QUICK)?;
+        let log_wild = self.wild.ln();
+        let largest = log_right.max(log_wild);
+        let log_likelihood = largest + ((log_right - largest).exp() + (log_wild - largest).exp()).ln();
+        let share = (log_right - log_likelihood).exp();
+        let next = if share < NEGLIGIBLE {
+            belief
+        } else if 1.0 - share < NEGLIGIBLE {
+            right
+        } else {
+            mixed(&right, &belief, share)?
+        };
+        Ok((next, log_likelihood))
     }
 }
 
 impl Likelihood<1> for Said<'_> {
     fn log_likelihood(&self, level: &Vector1<f64>) -> f64 {
-        (self.right(level[0]) + self.wild).ln()
+        (self.log_right(level[0]).exp() + self.wild).ln()
+    }
+}
+
+/// A reading that is not wild.
+struct Right<'a>(&'a Said<'a>);
+
+impl Likelihood<1> for Right<'_> {
+    fn log_likelihood(&self, level: &Vector1<f64>) -> f64 {
+        self.0.log_right(level[0])
     }
 }
 
@@ -67,7 +102,7 @@ where
             if instant.values.is_empty() {
                 continue;
             }
-            let said: Vec<Said<'_>> = instant
+            let mut said: Vec<Said<'_>> = instant
                 .values
                 .iter()
                 .map(|(sensor, reading)| Said {
@@ -77,13 +112,26 @@ where
                     wild: reading.wild(WILD, range),
                 })
                 .collect();
-            let observed: Vec<&dyn Likelihood<1>> = said.iter().map(|one| one as &dyn Likelihood<1>).collect();
             let expected = Belief::mean(&belief)[0];
-            let (next, log_likelihood) = updated(&belief, &observed, &QUICK)?;
-            belief = next;
-            total += log_likelihood;
+            let mut wide: Vec<&dyn Likelihood<1>> = Vec::new();
+            for one in &mut said {
+                let spacing = belief.grid().spacing();
+                if one.reading.width(one.noise) < NARROW * spacing {
+                    let (next, log_likelihood) = one.narrow(belief)?;
+                    belief = next;
+                    total += log_likelihood;
+                } else {
+                    one.noise = one.noise.hypot(SMEARED * spacing);
+                    wide.push(one);
+                }
+            }
+            if !wide.is_empty() {
+                let (next, log_likelihood) = updated(&belief, &wide, &QUICK)?;
+                belief = next;
+                total += log_likelihood;
+            }
             let level = Belief::mean(&belief)[0];
-            let agrees = said.iter().any(|one| one.right(level) > one.wild);
+            let agrees = said.iter().any(|one| one.log_right(level) > one.wild.ln());
             astray = if agrees { 0 } else { astray + 1 };
             if astray >= JUMP {
                 let values = instant.values.iter().filter_map(|(_, reading)| reading.middle());

@@ -120,20 +120,28 @@ impl Reading {
         }
     }
 
-    /// Density or probability of it, if the measurement without noise is `level`.
-    pub(super) fn given(&self, level: f64, noise: f64, period: Option<f64>) -> f64 {
+    /// The standard deviation of a value's noise, or the distance of two ends.
+    pub(super) fn width(&self, noise: f64) -> f64 {
+        match *self {
+            Self::Value { deviation, .. } => deviation.unwrap_or(noise),
+            Self::Within { lower, upper } => upper - lower,
+        }
+    }
+
+    /// Logarithm of its density or probability, if the measurement without noise is `level`.
+    pub(super) fn log_given(&self, level: f64, noise: f64, period: Option<f64>) -> f64 {
         match *self {
             Self::Value { value, deviation } => {
                 let noise = deviation.unwrap_or(noise);
                 let score = wrapped(value - level, period) / noise;
-                (-0.5 * score * score).exp() / (std::f64::consts::TAU.sqrt() * noise)
+                -0.5 * score * score - (std::f64::consts::TAU.sqrt() * noise).ln()
             }
             Self::Within { lower, upper } => {
                 let shift = match (lower.is_finite() && upper.is_finite(), period) {
                     (true, Some(_)) => wrapped(0.5 * (lower + upper) - level, period) - 0.5 * (lower + upper),
                     _ => -level,
                 };
-                log_interval((lower + shift) / noise, (upper + shift) / noise).exp()
+                log_interval((lower + shift) / noise, (upper + shift) / noise)
             }
         }
     }

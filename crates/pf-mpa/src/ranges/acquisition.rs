@@ -151,6 +151,7 @@ pub(super) fn hypotheses(
     let kept = counts.count();
     parts.truncate(kept);
     let mut all = Vec::new();
+    let all_good = vec![GOOD; anchors];
     for (search, one, log_share) in &parts {
         let ranges = left(one.without);
         let out = one.without.map(|i| collected[i].anchor);
@@ -158,12 +159,23 @@ pub(super) fn hypotheses(
             .map(|anchor| if out == Some(anchor) { GOOD_AFTER_OUTLIER } else { GOOD })
             .collect();
         for (variant, (own, probability)) in known.anchor_biases.iter().enumerate() {
-            let Some((filters, weights, log_evidence)) = search.bank(one, &ranges, *own) else {
+            // A bias of an anchor's own is an explanation of its range: it is taken in at a place that the others explain.
+            let is_apart = own.only().is_some();
+            if is_apart && out.is_some() && out != own.only() {
+                continue;
+            }
+            let (ranges, good, without) = if is_apart {
+                (collected, &all_good, None)
+            } else {
+                (&ranges[..], &good, one.without)
+            };
+            let Some((filters, weights, log_evidence)) = search.bank(one, ranges, *own) else {
                 continue;
             };
-            let log_weight = log_evidence + penalty(one.without) + probability.ln() + log_share;
+            let log_weight = log_evidence + penalty(without) + probability.ln() + log_share;
             let mut hypothesis = Hypothesis::new(log_weight, filters, weights, good.clone(), variant);
-            hypothesis.is_cut = is_short(ranges.len());
+            hypothesis.is_cut = is_short(ranges.len() - usize::from(is_apart));
+            hypothesis.apart = own.only();
             all.push(hypothesis);
         }
     }

@@ -4,6 +4,9 @@ use super::RangeTracker;
 use super::bank::Hypothesis;
 use crate::Error;
 
+/// An anchor's own bias is told if it is so many deviations from zero.
+const APPARENT: f64 = 3.0;
+
 impl RangeTracker {
     /// Total bits of all ranges so far.
     pub fn bits(&self) -> usize {
@@ -47,5 +50,25 @@ impl RangeTracker {
             .map(|(one, share)| share * one.good[number])
             .sum();
         Ok(if self.hypotheses.is_empty() { 1.0 } else { sum })
+    }
+
+    /// The bias that an anchor has alone, beside the common one, if it is more probable than not that it has one, and its estimate is more than
+    /// three deviations from zero: the anchor stands elsewhere than said, or its ranges take another way. They are used less this bias.
+    ///
+    /// # Errors
+    /// If there is no such anchor.
+    pub fn own_bias(&self, anchor: &str) -> Result<Option<f64>, Error> {
+        let number = self.number(anchor)?;
+        let (mut probability, mut bias, mut square) = (0.0, 0.0, 0.0);
+        for (one, share) in self.hypotheses.iter().zip(self.shares()) {
+            if one.apart == Some(number) {
+                let ([own], [[variance]]) = one.marginal(&[2 * self.known.axes + 2]);
+                probability += share;
+                bias += share * own;
+                square += share * (variance + own * own);
+            }
+        }
+        let (bias, square) = (bias / probability, square / probability);
+        Ok((probability > 0.5 && bias * bias > APPARENT * APPARENT * (square - bias * bias)).then_some(bias))
     }
 }

@@ -29,8 +29,9 @@ pub(super) struct Hypothesis {
     pub(super) good: Vec<f64>,
     /// Whether it is a piece of a curve of places: short enough that the error of scale is estimated though the ranges alone do not determine it.
     pub(super) is_cut: bool,
-    /// Which deviation of single anchors' biases it has.
+    /// Which supposition of single anchors' biases it has, and the anchor that alone has one.
     pub(super) variant: usize,
+    pub(super) apart: Option<usize>,
     /// Probability that a range is no outlier, averaged over the latest ranges.
     pub(super) agreement: f64,
     /// Ranges in a row for which the anchors that are left did not determine the position.
@@ -53,6 +54,7 @@ impl Clone for Hypothesis {
             weights: self.weights.clone(),
             good: self.good.clone(),
             variant: self.variant,
+            apart: self.apart,
             is_cut: self.is_cut,
             agreement: self.agreement,
             contradicted: self.contradicted,
@@ -69,7 +71,7 @@ impl Clone for Hypothesis {
         self.log_weight = from.log_weight;
         self.weights.clone_from(&from.weights);
         self.good.clone_from(&from.good);
-        self.variant = from.variant;
+        (self.variant, self.apart) = (from.variant, from.apart);
         self.is_cut = from.is_cut;
         self.agreement = from.agreement;
         self.contradicted = from.contradicted;
@@ -103,6 +105,7 @@ impl Hypothesis {
             weights,
             good,
             variant,
+            apart: None,
             is_cut: false,
             agreement: 1.0,
             contradicted: 0,
@@ -225,10 +228,10 @@ impl Hypothesis {
         }
     }
 
-    /// Number of anchors among `heard` whose ranges depend on the distance.
+    /// Number of anchors among `heard` whose ranges depend on the distance, without one whose bias is its own.
     pub(super) fn usable(&self, heard: impl Fn(usize) -> bool) -> usize {
         (0..self.good.len())
-            .filter(|anchor| heard(*anchor) && self.good[*anchor] > 0.5)
+            .filter(|anchor| heard(*anchor) && self.good[*anchor] > 0.5 && self.apart != Some(*anchor))
             .count()
     }
 

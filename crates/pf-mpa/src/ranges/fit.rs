@@ -9,7 +9,7 @@
 use super::gaussian::Normal;
 use super::root::root;
 use super::rows::{Collected, Rows};
-use super::settings::Known;
+use super::settings::{Known, Own};
 
 /// What is known of bias and scale: mean and variance of each.
 pub(super) type Calibration = [(f64, f64); 2];
@@ -149,7 +149,7 @@ fn solve<const S: usize>(root: &Matrix<S>, right: &Vector<S>) -> Vector<S> {
 
 /// The most probable state near a start, its covariance there, and the evidence, in a slice of the positions if there is one. `None` if the
 /// information is singular.
-pub(super) fn fit(search: &Search<'_>, start: &[f64], rows: &Rows<'_>, speed: f64, own: f64) -> Option<(Normal, f64)> {
+pub(super) fn fit(search: &Search<'_>, start: &[f64], rows: &Rows<'_>, speed: f64, own: Own) -> Option<(Normal, f64)> {
     if search.axes() == 2 {
         fit_of::<4>(search, start, rows, speed, own)
     } else {
@@ -162,7 +162,7 @@ fn fit_of<const S: usize>(
     start: &[f64],
     rows: &Rows<'_>,
     speed: f64,
-    own: f64,
+    own: Own,
 ) -> Option<(Normal, f64)> {
     let axes = S - 2;
     let (mut middle, mut prior) = ([0.0; S], [0.0; S]);
@@ -175,7 +175,12 @@ fn fit_of<const S: usize>(
     let problem = Problem {
         search,
         rows,
-        variances: rows.deviations.iter().map(|one| one * one + own * own).collect(),
+        variances: rows
+            .ranges
+            .iter()
+            .zip(&rows.deviations)
+            .map(|(range, one)| one * one + own.of(range.anchor).powi(2))
+            .collect(),
         middle,
         prior,
     };
@@ -222,9 +227,10 @@ fn fit_of<const S: usize>(
 }
 
 /// The law of the whole state.
-fn law<const S: usize>(problem: &Problem<'_, S>, x: &Vector<S>, factor: &Matrix<S>, speed: f64, own: f64) -> Normal {
+fn law<const S: usize>(problem: &Problem<'_, S>, x: &Vector<S>, factor: &Matrix<S>, speed: f64, own: Own) -> Normal {
     let axes = S - 2;
-    let n = 2 * axes + 2 + if own > 0.0 { problem.search.anchors } else { 0 };
+    let first = 2 * axes + 2;
+    let n = first + own.count(problem.search.anchors);
     let mut inverse = [[0.0; S]; S];
     for (i, column) in inverse.iter_mut().enumerate() {
         let mut unit = [0.0; S];
@@ -246,20 +252,22 @@ fn law<const S: usize>(problem: &Problem<'_, S>, x: &Vector<S>, factor: &Matrix<
         }
     }
     (axes..2 * axes).for_each(|i| covariance[i * n + i] = speed * speed);
-    if own > 0.0 {
-        let first = 2 * axes + 2;
-        (first..n).for_each(|i| covariance[i * n + i] = own * own);
+    if n > first {
+        let deviation = own.deviation();
+        (first..n).for_each(|i| covariance[i * n + i] = deviation * deviation);
         // Given the state, the bias of an anchor is a share of what its range is off.
         let shares: Vec<(usize, f64, Vector<S>)> = problem
             .rows
             .ranges
             .iter()
             .zip(&problem.variances)
+            .filter(|(one, _)| own.of(one.anchor) > 0.0)
             .map(|(one, variance)| {
                 let (expected, slope) = problem.expected(x, one);
-                let share = own * own / variance;
-                mean[first + one.anchor] = share * (one.range - expected);
-                (first + one.anchor, share, slope)
+                let share = deviation * deviation / variance;
+                let at = first + if own.only().is_some() { 0 } else { one.anchor };
+                mean[at] = share * (one.range - expected);
+                (at, share, slope)
             })
             .collect();
         for (at, share, slope) in &shares {
@@ -271,10 +279,19 @@ fn law<const S: usize>(problem: &Problem<'_, S>, x: &Vector<S>, factor: &Matrix<
             }
             for (other, other_share, other_slope) in &shares {
                 let common: f64 = -other_share * (0..S).map(|i| cross[i] * other_slope[i]).sum::<f64>();
-                let alone = if at == other { own * own * (1.0 - share) } else { 0.0 };
+                let alone = if at == other {
+                    deviation * deviation * (1.0 - share)
+                } else {
+                    0.0
+                };
                 covariance[at * n + other] = common + alone;
             }
         }
     }
-    Normal { mean, covariance, axes }
+    Normal {
+        mean,
+        covariance,
+        axes,
+        only: own.only(),
+    }
 }

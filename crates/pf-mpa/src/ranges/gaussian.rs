@@ -1,7 +1,7 @@
 //! One filter of the bank: a Gaussian of position, velocity, common bias, error of scale, and biases of single anchors.
 //!
 //! ```text
-//! state     positions (2 or 3), as many velocities, bias, scale, one bias per anchor or none
+//! state     positions (2 or 3), as many velocities, bias, scale, one bias per anchor, that of one anchor, or none
 //! range     (1 + scale) |position - anchor| + bias + bias of the anchor + noise
 //! moments   of the distance by cubature over the position, so that a wide belief near an anchor is not linearised at one point
 //! ```
@@ -15,6 +15,8 @@ pub(super) struct Normal {
     pub(super) covariance: Vec<f64>,
     /// Number of positions, 2 or 3.
     pub(super) axes: usize,
+    /// The one anchor that has a bias of its own, if it is one.
+    pub(super) only: Option<usize>,
 }
 
 /// Moments of one noise-free range: mean, variance, and covariance with the state.
@@ -67,6 +69,7 @@ impl Clone for Normal {
             mean: self.mean.clone(),
             covariance: self.covariance.clone(),
             axes: self.axes,
+            only: self.only,
         }
     }
 
@@ -74,7 +77,7 @@ impl Clone for Normal {
     fn clone_from(&mut self, from: &Self) {
         self.mean.clone_from(&from.mean);
         self.covariance.clone_from(&from.covariance);
-        self.axes = from.axes;
+        (self.axes, self.only) = (from.axes, from.only);
     }
 }
 
@@ -89,8 +92,11 @@ impl Normal {
 
     /// The coordinate of an anchor's own bias.
     pub(super) fn own(&self, anchor: usize) -> Option<usize> {
-        let at = 2 * self.axes + 2 + anchor;
-        (at < self.mean.len()).then_some(at)
+        let at = |number: usize| Some(2 * self.axes + 2 + number).filter(|at| *at < self.mean.len());
+        match self.only {
+            Some(only) => at(0).filter(|_| only == anchor),
+            None => at(anchor),
+        }
     }
 
     pub(super) fn variance(&self, i: usize) -> f64 {
@@ -309,6 +315,7 @@ pub(super) fn merged<'a>(parts: impl Iterator<Item = (f64, &'a Normal)> + Clone)
         mean,
         covariance,
         axes: first.axes,
+        only: first.only,
     })
 }
 
@@ -325,6 +332,7 @@ mod tests {
             mean: vec![3.0, 4.0, 0.0, 0.0, 0.0, 0.0],
             covariance: vec![0.0; n * n],
             axes: 2,
+            only: None,
         };
         for (i, variance) in [1.0, 1.0, 0.1, 0.1, 0.5, 0.01].into_iter().enumerate() {
             normal.covariance[i * n + i] = variance;

@@ -124,6 +124,7 @@ impl RangeTracker {
         let mut known = settings.known(&places)?;
         if travel != Travel::Full {
             known.negligible = NEGLIGIBLE_OF_LEVELS;
+            known.anchor_biases.retain(|(own, _)| own.only().is_none());
         }
         Ok(Self {
             names: anchors
@@ -328,6 +329,11 @@ impl RangeTracker {
         });
         // Anchors that send ranges, but contradict each other so much that those that are left do not determine the position.
         count_contradictions(next, known.axes + 1, |other| last - heard[other] <= known.silence);
+        // One anchor that is apart and others that contradict: an explanation that leaves too few anchors for a place is none beside others.
+        let is_enough = |one: &Hypothesis| one.apart.is_none() || one.contradicted == 0;
+        if next.iter().any(is_enough) {
+            next.retain(is_enough);
+        }
         if is_undecided {
             next.iter_mut().for_each(|one| one.fall_behind(best));
         }

@@ -3,6 +3,7 @@
 use super::fit::{Search, fit};
 use super::gaussian::Normal;
 use super::rows::{Collected, Rows, Slice};
+use super::settings::Own;
 use nalgebra::DMatrix;
 
 /// Grid: nodes to either side of the middle, and from one to the next in deviations of the prior, for two coordinates and for three.
@@ -139,7 +140,8 @@ impl Search<'_> {
         let mut from = start.to_vec();
         // From the largest noise down: the place of one is the start of the next.
         for noise in self.known.noises.iter().rev().step_by(NOISES_TRIED) {
-            let Some((normal, log_evidence)) = fit(self, &from, &Rows::new(ranges, *noise, speed, None), speed, 0.0)
+            let Some((normal, log_evidence)) =
+                fit(self, &from, &Rows::new(ranges, *noise, speed, None), speed, Own::Each(0.0))
             else {
                 continue;
             };
@@ -190,7 +192,7 @@ impl Search<'_> {
                     deviation,
                 };
                 let rows = Rows::new(ranges, one.noise, speed, Some(slice));
-                let Some((normal, log_evidence)) = fit(self, &from, &rows, speed, 0.0) else {
+                let Some((normal, log_evidence)) = fit(self, &from, &rows, speed, Own::Each(0.0)) else {
                     break;
                 };
                 from.clone_from(&normal.mean);
@@ -212,7 +214,7 @@ impl Search<'_> {
     }
 
     /// The filters of a place with their weights, and its evidence over all of them.
-    pub(super) fn bank(&self, one: &Found, ranges: &[Collected], own: f64) -> Option<(Vec<Normal>, Vec<f64>, f64)> {
+    pub(super) fn bank(&self, one: &Found, ranges: &[Collected], own: Own) -> Option<(Vec<Normal>, Vec<f64>, f64)> {
         let mut filters: Vec<Option<(Normal, f64)>> = Vec::new();
         // Of each fit the variances of the ranges, and its number.
         let mut fitted: Vec<(Vec<f64>, usize)> = Vec::new();
@@ -220,7 +222,7 @@ impl Search<'_> {
             for noise in &self.known.noises {
                 let variances: Vec<f64> = ranges
                     .iter()
-                    .map(|range| noise * noise + (speed * range.age).powi(2) + own * own)
+                    .map(|range| noise * noise + (speed * range.age).powi(2) + own.of(range.anchor).powi(2))
                     .collect();
                 let is_alike = |known: &[f64]| {
                     let mut pairs = variances.iter().zip(known);

@@ -14,6 +14,8 @@ mod shares {
     pub(super) const SPEEDS: f64 = 10.0;
     pub(super) const BIAS: f64 = 0.2;
     pub(super) const ANCHOR_BIAS: f64 = 0.03;
+    /// Probability that an anchor has a bias of its own of the size of the common one.
+    pub(super) const OUT_OF_PLACE: f64 = 0.01;
     pub(super) const STRAY: f64 = 4.0;
     /// Deviation of an estimated height, at least.
     pub(super) const HEIGHT: f64 = 0.5;
@@ -105,6 +107,45 @@ impl Default for RangeSettings {
     }
 }
 
+/// Which anchors have a bias of their own, and its deviation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Own {
+    /// All anchors, or none if the deviation is zero.
+    Each(f64),
+    /// One anchor.
+    Only { anchor: usize, deviation: f64 },
+}
+
+impl Own {
+    pub(super) fn deviation(&self) -> f64 {
+        match *self {
+            Self::Each(deviation) | Self::Only { deviation, .. } => deviation,
+        }
+    }
+
+    /// The deviation of an anchor's own bias.
+    pub(super) fn of(&self, anchor: usize) -> f64 {
+        let is_meant = self.only().is_none_or(|only| only == anchor);
+        if is_meant { self.deviation() } else { 0.0 }
+    }
+
+    pub(super) fn only(&self) -> Option<usize> {
+        match *self {
+            Self::Each(_) => None,
+            Self::Only { anchor, .. } => Some(anchor),
+        }
+    }
+
+    /// Number of biases of single anchors.
+    pub(super) fn count(&self, anchors: usize) -> usize {
+        match *self {
+            Self::Each(deviation) if deviation > 0.0 => anchors,
+            Self::Each(_) => 0,
+            Self::Only { .. } => 1,
+        }
+    }
+}
+
 /// All numbers, in the unit of the anchors' coordinates.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Known {
@@ -125,8 +166,8 @@ pub(super) struct Known {
     pub(super) bias: f64,
     pub(super) scale: f64,
     pub(super) drift: f64,
-    /// The deviations of single anchors' biases that are considered, each with its probability.
-    pub(super) anchor_biases: Vec<(f64, f64)>,
+    /// What is supposed of single anchors' biases, each with its probability.
+    pub(super) anchor_biases: Vec<(Own, f64)>,
     pub(super) silence: f64,
     /// A filter of less weight is left out until changes from its neighbours reach it again, and a smaller share of these does not change a filter.
     pub(super) negligible: f64,
@@ -181,10 +222,20 @@ impl RangeSettings {
         let drift = self.drift.unwrap_or((DRIFT * bias).powi(2));
         non_negative("drift", drift)?;
         let anchor_biases = match self.anchor_bias {
-            Some(deviation) => vec![(non_negative("anchor_bias", deviation)?, 1.0)],
-            None if bias > 0.0 => vec![(0.0, 0.7), (shares::ANCHOR_BIAS * spread, 0.3)],
+            Some(deviation) => vec![(Own::Each(non_negative("anchor_bias", deviation)?), 1.0)],
+            None if bias > 0.0 => {
+                let mut all = vec![(Own::Each(0.0), 0.7), (Own::Each(shares::ANCHOR_BIAS * spread), 0.3)];
+                // One anchor stands elsewhere, or is behind a wall for good.
+                if anchors.len() > 3 && !self.unknown_clock {
+                    let deviation = shares::BIAS * spread;
+                    all.extend(
+                        (0..anchors.len()).map(|anchor| (Own::Only { anchor, deviation }, shares::OUT_OF_PLACE)),
+                    );
+                }
+                all
+            }
             // Who says that there is no bias means that of single anchors too.
-            None => vec![(0.0, 1.0)],
+            None => vec![(Own::Each(0.0), 1.0)],
         };
         let is_flat = anchors.iter().all(|place| place.z == 0.0);
         let height = |deviation: f64| deviation.max(shares::HEIGHT * spread);

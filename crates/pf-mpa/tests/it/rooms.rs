@@ -23,6 +23,8 @@ struct Room {
     scale: f64,
     speed: f64,
     middle: (f64, f64),
+    /// An anchor whose ranges are longer by so much.
+    long: Option<(usize, f64)>,
 }
 
 impl Room {
@@ -61,6 +63,7 @@ impl Room {
                 .collect(),
             noise,
             speed,
+            long: None,
             middle: (corner.0 + 0.5 * wide, corner.1 + 0.5 * deep),
         }
     }
@@ -77,6 +80,8 @@ struct Outcome {
     squares: f64,
     nees: f64,
     searching: usize,
+    /// The bias that the tracker says the long anchor has alone.
+    own_bias: Option<f64>,
     /// Seconds of pushes while searching and while tracking.
     seconds: [f64; 2],
 }
@@ -99,8 +104,13 @@ fn walk(room: &Room, seed: u64, travel: Travel, settings: RangeSettings) -> Outc
         state = model.over(seconds).unwrap().propagate(&mut rng, &state);
         let (name, place) = &room.anchors[k % room.anchors.len()];
         let truth = Vector3::new(state[0], state[2], 0.0);
-        let range =
-            (1.0 + room.scale) * (truth - place).norm() + room.bias + room.noise * rng.sample::<f64, _>(StandardNormal);
+        let own = room
+            .long
+            .filter(|(long, _)| long % room.anchors.len() == k % room.anchors.len());
+        let range = own.map_or(0.0, |(_, bias)| bias)
+            + (1.0 + room.scale) * (truth - place).norm()
+            + room.bias
+            + room.noise * rng.sample::<f64, _>(StandardNormal);
         let begun = std::time::Instant::now();
         let found = tracker.push(time, name, range).unwrap();
         let is_first = found.is_some() && outcome.rows == 0;
@@ -122,6 +132,10 @@ fn walk(room: &Room, seed: u64, travel: Travel, settings: RangeSettings) -> Outc
         outcome.longest_wrong = outcome.longest_wrong.max(wrong);
     }
     outcome.losses = tracker.losses();
+    outcome.own_bias = room.long.and_then(|(long, _)| {
+        let (name, _) = &room.anchors[long % room.anchors.len()];
+        tracker.own_bias(name).unwrap()
+    });
     outcome
 }
 
@@ -206,6 +220,28 @@ fn no_confident_place_is_wrong() {
         let (share, wrong) = measure(0..12, travel);
         assert!(wrong == 0 && share > 0.9, "{travel:?}: {wrong} rooms, bands hold {share}");
     }
+}
+
+/// Defect: one anchor whose ranges are long for good drew the place away, with a narrow band: 74 % of the truths were held, and in 12 of 60 rooms
+/// the place was wrong for twenty ranges and more.
+#[test]
+fn a_long_anchor_is_found_or_the_band_holds() {
+    let (mut rows, mut held, mut wrong, mut named) = (0, 0, 0, 0);
+    for seed in 0..16 {
+        let mut room = Room::random(seed);
+        if room.anchors.len() < 4 {
+            continue;
+        }
+        room.long = Some((seed as usize, 1.0 + 0.1 * seed as f64));
+        room.noise = room.noise.min(0.2);
+        let outcome = walk(&room, seed, Travel::Full, RangeSettings::default());
+        rows += outcome.rows;
+        held += outcome.held;
+        wrong += usize::from(outcome.longest_wrong >= LONG);
+        named += usize::from(outcome.own_bias.is_some_and(|found| found > 0.0));
+    }
+    println!("{held} of {rows}, wrong in {wrong}, named in {named}");
+    assert!(held * 100 > rows * 88 && wrong <= 1 && named > 5, "{held} of {rows}, {wrong}, {named}");
 }
 
 /// Defect: with 2 bits, ranges of which it is doubtful whether they depend on the distance left a covariance that was not positive definite.
