@@ -11,35 +11,27 @@
 mod offsets;
 mod on_grid;
 mod reading;
+mod search;
 
 pub use offsets::{median, offsets, shift_deviation};
 pub use reading::Reading;
+pub use search::Number;
 
 use crate::{Error, assumed_density};
 use fewbits_core::{Evolution, Gaussian, GaussianDynamics};
-use fewbits_numerics::error::{finite, positive, refuse};
+use fewbits_numerics::error::{finite, refuse};
 use nalgebra::SMatrix;
+use search::Search;
 
 /// Assumed share of wild values.
 const WILD: f64 = 0.002;
 /// Instants in a row without a value that agrees with the prediction after which the level is taken to have jumped; also so many wild values of one
 /// sensor in a row, if the others are likelier where it says that the level is.
 const JUMP: u32 = 4;
-/// Steps of the search, in `ln`, and its reach about the start.
+/// Steps of the search, in `ln`.
 const STEPS: [f64; 6] = [2.0, 1.0, 0.5, 0.25, 0.1, 0.03];
-const REACH: f64 = 9.0;
-/// How far the first scan of the change reaches.
-const SCANNED: i32 = 6;
 /// Rounds over the single numbers.
 const ROUNDS: usize = 3;
-/// A number is raised by these steps while the likelihood, which is as high (within so many nats) so far below, loses little.
-const FAR_BELOW: f64 = 2.0;
-const AS_HIGH: f64 = 0.2;
-const RAISED: f64 = 0.25;
-const LITTLE: f64 = 1.0;
-/// Steps of the mean over a number, in `ln`, and how many to either side.
-const SETTLED: f64 = 0.125;
-const FAR: i32 = 16;
 /// A sensor with fewer values than this has the noise that all have together.
 const MIN_READINGS: usize = 12;
 
@@ -50,55 +42,6 @@ pub struct Instant {
     pub seconds: f64,
     /// Index of a sensor, and what it says.
     pub values: Vec<(usize, Reading)>,
-}
-
-/// A standard deviation or a factor: known, or to be found from a first guess.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Number {
-    /// It is held fixed.
-    Known(f64),
-    /// It is found.
-    Unknown {
-        /// First guess.
-        guess: f64,
-        /// Smallest number that is considered, for instance because values are rounded.
-        least: f64,
-    },
-}
-
-impl Number {
-    fn check(&self, name: &'static str) -> Result<(), Error> {
-        match self {
-            Self::Known(number) => positive(name, *number)?,
-            Self::Unknown { guess, least } => {
-                finite(name, *least)?;
-                positive(name, *guess)?
-            }
-        };
-        Ok(())
-    }
-
-    fn start(&self) -> f64 {
-        match self {
-            Self::Known(number) => *number,
-            Self::Unknown { guess, least } => guess.max(*least),
-        }
-    }
-
-    /// The number at `ln` this far from the start; `None` if it is out of reach.
-    fn at(&self, shift: f64) -> Option<f64> {
-        match self {
-            Self::Known(number) => Some(*number),
-            Self::Unknown { least, .. } => {
-                let number = self.start() * shift.exp();
-                (shift.abs() <= REACH && number >= *least).then_some(number)
-            }
-        }
-    }
-
-    fn is_unknown(&self) -> bool {
-        matches!(self, Self::Unknown { .. })
-    }
 }
 
 /// What was found.
@@ -298,114 +241,5 @@ where
         others
             .map(|(sensor, reading)| log(*sensor, reading, level) - log(*sensor, reading, predicted))
             .sum()
-    }
-}
-
-/// A search along groups of numbers that move together, in `ln`.
-struct Search<'a, L> {
-    change: Number,
-    noises: &'a [Number],
-    /// Of the change, then of each noise.
-    shifts: Vec<f64>,
-    best: f64,
-    log_likelihood: L,
-}
-
-impl<L: Fn(f64, &[f64]) -> f64> Search<'_, L> {
-    fn at(&self, shifts: &[f64]) -> f64 {
-        let noises: Option<Vec<f64>> = self
-            .noises
-            .iter()
-            .zip(&shifts[1..])
-            .map(|(one, shift)| one.at(*shift))
-            .collect();
-        match (self.change.at(shifts[0]), noises) {
-            (Some(change), Some(noises)) => (self.log_likelihood)(change, &noises),
-            _ => f64::NEG_INFINITY,
-        }
-    }
-
-    /// Replaces a number by the root of the mean of its square under its likelihood, the other numbers held: what may as well be smaller or larger
-    /// makes bands too narrow more than too wide. Where the likelihood is as high far below, it says nothing but an upper end, and the largest number
-    /// that is not improbable is taken.
-    fn settle(&mut self, axis: usize) {
-        let moved = |by: f64| {
-            let mut other = self.shifts.clone();
-            other[axis] += by;
-            other
-        };
-        let number = if axis == 0 {
-            &self.change
-        } else {
-            &self.noises[axis - 1]
-        };
-        // Not below the least number that is considered.
-        let room = match number {
-            Number::Unknown { least, .. } if *least > 0.0 => self.shifts[axis] - (least / number.start()).ln(),
-            _ => FAR_BELOW,
-        };
-        // Nor out of the reach of the search, where it ends if the number hardly matters.
-        let down = FAR_BELOW.min(room).min(REACH + self.shifts[axis]);
-        let here = self.at(&self.shifts);
-        // At the least number it is as small as it may be.
-        let is_flat = down < RAISED || self.at(&moved(-down)) >= here - AS_HIGH * down / FAR_BELOW;
-        if !is_flat {
-            let (mut sum, mut squares) = (0.0, 0.0);
-            for k in -FAR..=FAR {
-                let by = SETTLED * f64::from(k);
-                let weight = (self.at(&moved(by)) - here).exp();
-                sum += weight;
-                squares += weight * (2.0 * by).exp();
-            }
-            let by = 0.5 * (squares / sum).ln();
-            if by.is_finite() && self.at(&moved(by)).is_finite() {
-                self.shifts[axis] += by;
-            }
-            return;
-        }
-        let mut by = 0.0;
-        while by < REACH && self.at(&moved(by + RAISED)) > here - LITTLE {
-            by += RAISED;
-        }
-        // What no reading depends on stays as it is.
-        if by < REACH {
-            self.shifts[axis] += by;
-        }
-    }
-
-    /// Begins at the best of some changes that are factors of e apart.
-    fn scan(&mut self) {
-        let start = self.shifts.clone();
-        for k in -SCANNED..=SCANNED {
-            let mut other = start.clone();
-            other[0] += f64::from(k);
-            let found = self.at(&other);
-            if found > self.best {
-                (self.best, self.shifts) = (found, other);
-            }
-        }
-    }
-
-    /// Moves along each group, with smaller and smaller steps.
-    fn improve(&mut self, groups: &[Vec<usize>], steps: &[f64]) {
-        for step in steps {
-            loop {
-                let before = self.best;
-                for group in groups.iter().filter(|group| !group.is_empty()) {
-                    for sign in [-step, *step] {
-                        let mut other = self.shifts.clone();
-                        group.iter().for_each(|axis| other[*axis] += sign);
-                        let found = self.at(&other);
-                        if found > self.best {
-                            (self.best, self.shifts) = (found, other);
-                        }
-                    }
-                }
-                let has_risen = self.best > before;
-                if !has_risen {
-                    break;
-                }
-            }
-        }
     }
 }

@@ -41,6 +41,7 @@ mod rival;
 mod slot;
 mod state;
 mod together;
+mod votes;
 mod window;
 
 pub use fewbits_core::Event;
