@@ -196,7 +196,8 @@ def test_searches(rooms, rate):
 def calibrated():
     rng = np.random.default_rng(2)
     level = np.cumsum(0.3 * rng.standard_normal(120))
-    table = {"t": np.arange(120.0), "a": level + 0.2 * rng.standard_normal(120), "b": level + 2 + 0.4 * rng.standard_normal(120)}
+    noisy = {"a": level + 0.2 * rng.standard_normal(120), "b": level + 2 + 0.4 * rng.standard_normal(120)}
+    table = pl.DataFrame({"t": np.arange(120.0), **noisy})
     return table, fb.fit(table, time="t", reference="a")
 
 
