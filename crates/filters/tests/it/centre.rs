@@ -3,7 +3,7 @@
 use fewbits_core::{
     Dynamics, FullValue, Gaussian, GaussianDynamics, Likelihood, Link, Message, NumberFormat, Observation,
 };
-use fewbits_filters::centre::{Event, Failures, FusionCentre, Health, Reporting, Slot};
+use fewbits_filters::centre::{CentreState, Event, Failures, FusionCentre, Health, Reporting, Slot};
 use fewbits_filters::{BootstrapFilter, Error, MomentFilter, ResamplingRule, StateFilter};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::{Moments, Stream};
@@ -425,6 +425,55 @@ fn a_jump_is_told_from_a_wrong_sensor_by_less_accurate_ones() {
         println!("in turn {in_turn}: the wrong sensor is excluded in {found}, cover {cover}");
         assert!(found >= 95 && cover > 0.9, "{found} found, cover {cover}");
     }
+}
+
+/// While it holds a second belief, a centre is stored and restored to the bit, and a state with a damaged one is refused.
+#[test]
+fn a_centre_in_doubt_is_restored() {
+    let made = |rng: &mut dyn Rng| {
+        let walk = ContinuousLinear::random_walk(1e-6).unwrap();
+        let prior = Gaussian::scalar(20.0, 1.0).unwrap();
+        let mut centre = FusionCentre::new(rng, walk, MomentFilter, &prior).unwrap();
+        for (number, deviation) in [(0, 0.05_f64), (1, 0.9), (2, 0.9)] {
+            let (sensing, variance) = (LinearSensor::direct(deviation.powi(2)).unwrap(), deviation.powi(2));
+            let reporting = Reporting::values(sensing, FullValue::new(variance).unwrap(), Link::PERFECT);
+            centre.join(number, reporting).unwrap();
+        }
+        centre
+    };
+    let mut rng = Stream::new(4).rng();
+    let mut centre = made(&mut rng);
+    let mut in_doubt = 0;
+    for k in 1..=140_u32 {
+        let level = if k > 100 { 20.5 } else { 20.0 };
+        let sent = [0.05, 0.9, 0.9].map(|deviation| level + deviation * noise(&mut rng));
+        let slots: Vec<Slot> = (0..).zip(sent).map(|(number, value)| slot(number, value)).collect();
+        let stored = centre.state();
+        let mut other = made(&mut rng);
+        other
+            .restore(CentreState::from_bytes(&stored.to_bytes().unwrap()).unwrap())
+            .unwrap();
+        for one in [&mut centre, &mut other] {
+            one.advance(&mut rng, f64::from(k)).unwrap();
+            one.receive(&mut rng, &slots).unwrap();
+        }
+        assert_eq!(centre.state(), other.state(), "{k}");
+        let mut json = serde_json::to_value(&stored).unwrap();
+        if json["rival"].is_object() {
+            in_doubt += 1;
+            for (name, wrong) in [
+                ("mean", serde_json::json!([1.0, 2.0])),
+                ("covariance", serde_json::json!([-1.0])),
+            ] {
+                let right = std::mem::replace(&mut json["rival"][name], wrong);
+                let damaged = serde_json::from_value(json.clone()).unwrap();
+                let before = other.state();
+                assert!(other.restore(damaged).is_err() && other.state() == before);
+                json["rival"][name] = right;
+            }
+        }
+    }
+    assert!(in_doubt > 3, "{in_doubt}");
 }
 
 /// Defect: four wild values in a row were believed, and the level was reopened at a wild value. Wild values differ from each other, or are all the
