@@ -14,6 +14,13 @@ use crate::written::{self, Clock, Order, Problem, Syntax};
 
 /// Seconds from 1970 to 2200: later times of a logger count from another year.
 const SECONDS_OF_2200: f64 = 7_258_118_400.0;
+/// Numbers of 100 nanoseconds since 1601 (file times of Windows) from 1997 to 2100, and since the year 1 (ticks of .NET) from 1966 to 2092. As
+/// nanoseconds since 1970 they are of 1973 to 1975 and of 1989 to 1990.
+const OTHER_ZEROS: [[f64; 2]; 2] = [[1.26e17, 1.58e17], [6.2e17, 6.6e17]];
+const OTHER_ZERO: (&str, &str) = (
+    "may count 100 ns since 1601 (Windows) or since the year 1 (.NET)",
+    "say --time-format ns if it counts nanoseconds since 1970; otherwise convert the column",
+);
 
 /// What the cells of a column say of the time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -239,6 +246,15 @@ pub(crate) fn clock(
         && largest() > SECONDS_OF_2200 * 10_f64.powi(i32::from(unit.decimals()))
     {
         return Err(Refused::Cell(0, written::FAR));
+    }
+    if syntax == Syntax::Number(Unit::Nanoseconds)
+        && dialect.time_format.is_none()
+        && OTHER_ZEROS.iter().any(|[first, last]| {
+            let numbers = cells.iter().filter_map(|cell| cell.parse::<f64>().ok());
+            numbers.clone().next().is_some() && numbers.into_iter().all(|x| (*first..=*last).contains(&x))
+        })
+    {
+        return Err(Refused::Cell(0, OTHER_ZERO));
     }
     let has_offset = match &syntax {
         Syntax::Date(order) => cells.iter().any(|cell| guess::has_offset(cell, *order)),

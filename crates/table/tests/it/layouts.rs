@@ -109,6 +109,18 @@ fn numbers_of_no_plausible_year_are_asked_for() {
     assert!(message.contains("behind the year 2200") && message.contains("--time-format"), "{message}");
     assert_eq!(times(text, &["time"], Some("us")).unwrap()[0], "2393-03-05T09:58:00Z");
     assert_eq!(times(text, &["time"], Some("s")).unwrap()[0], "13354106280000000");
+    // 100 ns since 1601, and since the year 1; nanoseconds since 1970.
+    for [first, second] in [
+        [133_541_062_800_000_000_u64, 133_541_063_400_000_000],
+        [638_452_294_800_000_000, 638_452_295_400_000_000],
+    ] {
+        let text = format!("time,x\n{first},1\n{second},2\n");
+        let message = times(&text, &[], None).unwrap_err();
+        assert!(message.contains("may count 100 ns") && message.contains("--time-format ns"), "{message}");
+        assert!(times(&text, &["time"], Some("ns")).is_ok());
+    }
+    let text = "time,x\n1709632680000000000,1\n1709632740000000000,2\n";
+    assert_eq!(times(text, &[], None).unwrap()[0], "2024-03-05T09:58:00Z");
 }
 
 #[test]
