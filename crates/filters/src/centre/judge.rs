@@ -189,7 +189,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             if let Some(prior) = self.acquisition {
                 self.belief = self.filter.restart(rng, &prior, &self.belief)?;
                 self.history.clear();
-                self.rival = None;
+                self.alternative = None;
                 self.members.iter_mut().for_each(|member| member.state.forget_tests());
                 events.push(Event::Reacquired);
             }
@@ -232,9 +232,11 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     fn exclude(&mut self, seat: usize, fate: Fate, events: &mut Vec<Event>) {
         let own = self.members[seat].state;
         let excluded = self.members.iter().filter(|member| member.state.is_ignored()).count();
-        // The prediction may be what is wrong, until the others have spoken. They speak from the first rejected report on, or from the next
-        // report on. There is no rival to a report that is impossible.
-        let is_against = self.rival.and_then(|rival| rival.is_against(self.members[seat].number));
+        // The prediction may be wrong instead. The reports of the others decide, from the first rejected report on, or from the next report
+        // on. There is no alternative in which an impossible report is right.
+        let is_against = self
+            .alternative
+            .and_then(|alternative| alternative.is_against(self.members[seat].number));
         let is_early = self.health == Health::Exclude && !is_against.unwrap_or(fate == Fate::Rejected);
         if own.is_ignored() || is_early || self.health == Health::Off {
             return;

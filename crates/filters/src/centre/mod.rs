@@ -24,6 +24,7 @@
 //!
 //! Not in this module: radio, addresses, frames; the scheme of any single paper.
 
+mod alternative;
 mod by_value;
 mod gate;
 mod health;
@@ -31,17 +32,16 @@ mod judge;
 mod late;
 mod law;
 mod learning;
+mod log_ratio;
 mod one_wrong;
 mod presence;
 mod reading;
 mod receive;
 mod remote;
 mod repeats;
-mod rival;
 mod slot;
 mod state;
 mod together;
-mod votes;
 mod window;
 
 pub use fewbits_core::Event;
@@ -95,7 +95,7 @@ pub struct FusionCentre<const D: usize, F: StateFilter<D>> {
     dropped: u64,
     /// Number of instants in a row of which no report was used.
     astray: u32,
-    rival: Option<rival::Rival<D>>,
+    alternative: Option<alternative::Alternative<D>>,
     health: Health,
     failures: Failures,
     limits: health::Limits,
@@ -128,7 +128,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             history: Vec::new(),
             dropped: 0,
             astray: 0,
-            rival: None,
+            alternative: None,
             health: Health::default(),
             failures: Failures::default(),
             limits: health::Limits::new(&FalseAlarms::default()),
@@ -328,12 +328,12 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         if seconds > 0.0 {
             // On a copy, so that a failure leaves the centre as it was.
             let mut belief = self.belief.clone();
-            let rival = match self.rival {
-                Some(rival) => rival.moved(&*self.world.over(seconds)?, self.noise_scale),
+            let alternative = match self.alternative {
+                Some(alternative) => alternative.moved(&*self.world.over(seconds)?, self.noise_scale),
                 None => None,
             };
             self.moved(rng, &mut belief, seconds)?;
-            (self.belief, self.rival) = (belief, rival);
+            (self.belief, self.alternative) = (belief, alternative);
             let sensors = self.members.iter_mut().map(|member| &mut member.state.presence);
             self.outage.advance(seconds, &self.failures, sensors);
             self.now = time;

@@ -34,18 +34,20 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         let mut verdicts = self.gate(&law, &predicted, &readings);
         let mut belief = self.belief.clone();
         let mut reopened = false;
-        let mut rival = None;
+        let mut alternative = None;
         if self.health == Health::Exclude {
-            let found = self.rival(&predicted, &readings, &verdicts);
-            let jumped = found.filter(|(rival, _)| rival.is_believed()).map(|(_, wide)| {
-                let again = self.gate(&Law::Moments(wide), &wide, &readings);
-                (wide, again)
-            });
-            rival = found.map(|(rival, _)| rival);
+            let found = self.alternative(&predicted, &readings, &verdicts);
+            let jumped = found
+                .filter(|(alternative, _)| alternative.is_believed())
+                .map(|(_, wide)| {
+                    let again = self.gate(&Law::Moments(wide), &wide, &readings);
+                    (wide, again)
+                });
+            alternative = found.map(|(alternative, _)| alternative);
             if let Some((wide, again)) = self.reopened(&predicted, &readings, &verdicts).or(jumped) {
                 let start = self.acquisition.unwrap_or(wide);
                 belief = self.filter.restart(rng, &start, &self.belief)?;
-                (predicted, verdicts, reopened, rival) = (wide, again, true, None);
+                (predicted, verdicts, reopened, alternative) = (wide, again, true, None);
                 law = self.law(&belief, &predicted);
                 if self.acquisition.is_some() {
                     predicted = start;
@@ -72,7 +74,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             self.monitor,
             self.noise_scale,
             self.astray,
-            std::mem::replace(&mut self.rival, rival),
+            std::mem::replace(&mut self.alternative, alternative),
         );
         let earlier_history = self.acquisition.map(|_| self.history.clone());
         let earlier_belief = std::mem::replace(&mut self.belief, belief);
@@ -117,13 +119,13 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 Ok(Received { info, events })
             }
             Err(error) => {
-                let (states, outage, monitor, noise_scale, astray, rival) = earlier;
+                let (states, outage, monitor, noise_scale, astray, alternative) = earlier;
                 self.members
                     .iter_mut()
                     .zip(states)
                     .for_each(|(member, state)| member.state = state);
                 (self.outage, self.monitor, self.noise_scale, self.astray) = (outage, monitor, noise_scale, astray);
-                self.rival = rival;
+                self.alternative = alternative;
                 self.belief = earlier_belief;
                 self.history = earlier_history.unwrap_or_default();
                 Err(error)

@@ -1,9 +1,9 @@
 //! The state of a centre as a value that can be stored; a restored centre gives the same bits.
 
+use super::alternative::StoredAlternative;
 use super::health::Monitor;
 use super::presence::{Outage, Presence};
 use super::repeats::Repeats;
-use super::rival::StoredRival;
 use super::{FusionCentre, Slot};
 use crate::Error;
 use crate::contract::StateFilter;
@@ -144,7 +144,7 @@ pub struct CentreState<B> {
     dropped: u64,
     astray: u32,
     #[serde(default)]
-    rival: Option<StoredRival>,
+    alternative: Option<StoredAlternative>,
 }
 
 impl<B: Serialize> CentreState<B> {
@@ -199,7 +199,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             history: self.history.clone(),
             dropped: self.dropped,
             astray: self.astray,
-            rival: self.rival.as_ref().map(StoredRival::from),
+            alternative: self.alternative.as_ref().map(StoredAlternative::from),
         }
     }
 
@@ -218,7 +218,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             let expected = format!("the sensors {:?}", self.sensors().collect::<Vec<_>>());
             return refuse("state", format!("of the sensors {:?}", state.members.keys().collect::<Vec<_>>()), expected);
         }
-        let rival = state.rival.as_ref().map(StoredRival::read).transpose()?;
+        let alternative = state.alternative.as_ref().map(StoredAlternative::read).transpose()?;
         for (member, stored) in self.members.iter_mut().zip(state.members.into_values()) {
             member.state = stored;
         }
@@ -230,7 +230,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         self.history = state.history;
         self.dropped = state.dropped;
         self.astray = state.astray;
-        self.rival = rival;
+        self.alternative = alternative;
         Ok(())
     }
 }

@@ -54,7 +54,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         let mut belief = self.belief.clone();
         self.filter.predict(rng, dynamics, &mut belief)?;
         self.belief = belief;
-        self.rival = None;
+        self.alternative = None;
         let sensors = self.members.iter_mut().map(|member| &mut member.state.presence);
         self.outage.advance(seconds, &self.failures, sensors);
         self.now = time;

@@ -459,17 +459,17 @@ fn a_centre_in_doubt_is_restored() {
         }
         assert_eq!(centre.state(), other.state(), "{k}");
         let mut json = serde_json::to_value(&stored).unwrap();
-        if json["rival"].is_object() {
+        if json["alternative"].is_object() {
             in_doubt += 1;
             for (name, wrong) in [
                 ("mean", serde_json::json!([1.0, 2.0])),
                 ("covariance", serde_json::json!([-1.0])),
             ] {
-                let right = std::mem::replace(&mut json["rival"][name], wrong);
+                let right = std::mem::replace(&mut json["alternative"][name], wrong);
                 let damaged = serde_json::from_value(json.clone()).unwrap();
                 let before = other.state();
                 assert!(other.restore(damaged).is_err() && other.state() == before);
-                json["rival"][name] = right;
+                json["alternative"][name] = right;
             }
         }
     }
