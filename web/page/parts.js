@@ -131,7 +131,8 @@ function showDesign() {
 }
 get("download-header").onclick = () => download("quantizers.h", "text/x-c", designed.header);
 
-// Which scheme.
+// Which scheme. The one that was named last is named again when the price changes.
+let named;
 function showFrontier() {
   const price = get("price").value, label = get("price").selectedOptions[0].textContent;
   const x = FRONTIER.map((one) => Math.log10(one[price])), y = FRONTIER.map((one) => one.rmse);
@@ -143,9 +144,10 @@ function showFrontier() {
     series: [{ x: Float64Array.from(x), y: Float64Array.from(y), style: "none" }], xRange: [from, to], yRange: extent([y]), xLabel: label, yLabel: "RMSE", xTicks: spread, xText: (t) => short(10 ** t),
     extra: (X, Y) => FRONTIER.map((one, i) => `<circle class="dot${best(one) ? " best" : ""}" tabindex="0" role="img" aria-label="${escaped(said(one))}" data-scheme="${i}" cx="${X(x[i])}" cy="${Y(y[i])}" r="7"><title>${escaped(said(one))}</title></circle>`).join(""),
   });
-  for (const dot of get("frontier-plot").querySelectorAll(".dot")) {
-    dot.onpointerenter = dot.onfocus = dot.onclick = () => { get("frontier-name").textContent = said(FRONTIER[dot.dataset.scheme]); };
-  }
+  const name = (scheme) => { named = scheme; get("frontier-name").textContent = said(FRONTIER[scheme]); };
+  if (named !== undefined) name(named);
+  // A pointer that rests where a dot is drawn anew also enters it: only one that moves names a scheme.
+  for (const dot of get("frontier-plot").querySelectorAll(".dot")) dot.onpointermove = dot.onfocus = dot.onclick = () => name(dot.dataset.scheme);
   get("schemes").tBodies[0].innerHTML = FRONTIER.map((one) => `<tr><th scope="row" title="${escaped(one.scheme)}">${escaped(one.scheme)}</th><td>${one.rmse.toFixed(3)}</td><td>${short(one.payload)}</td><td>${short(one.air)}</td><td>${short(one.energy)}</td></tr>`).join("");
 }
 get("price").onchange = showFrontier;
