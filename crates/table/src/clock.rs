@@ -2,7 +2,7 @@
 
 use crate::civil;
 use crate::column::{Column, Kind};
-use crate::days::{by_name, may_be_days, may_be_julian};
+use crate::days::{by_name, has_date_name, may_be_compact, may_be_days, may_be_julian};
 use crate::dialect::Dialect;
 use crate::error::Error;
 use crate::guess::{self, Doubt};
@@ -56,6 +56,9 @@ fn says(column: &Column, sample: &[String], has_named: bool) -> Says {
         };
     }
     if column.kind != Kind::Time {
+        if has_date_name(&[&name]) && cells.iter().all(|cell| cell.len() == 6) && may_be_compact(&[&name], &cells) {
+            return Says::Day;
+        }
         let is_short = |cell: &&str| cell.len() <= 6 && cell.bytes().all(|c| c.is_ascii_digit());
         // Also with the zone behind each, as `2130 UTC`.
         let is_zoned = |cell: &&str| cell.len() == 8 && cell.ends_with(" UTC") && is_short(&&cell[..4]);
@@ -234,6 +237,9 @@ pub(crate) fn clock(
     }
     if syntax == Syntax::Number(Unit::Seconds) && dialect.time_format.is_none() && may_be_julian(names, &cells) {
         return Err(Refused::Cell(0, written::JULIAN));
+    }
+    if matches!(syntax, Syntax::Number(_)) && dialect.time_format.is_none() && may_be_compact(names, &cells) {
+        return Err(Refused::Cell(0, written::COMPACT));
     }
     let largest = || {
         cells

@@ -5,8 +5,11 @@ use crate::interval;
 use crate::named::OF_DAY;
 use crate::time::{SECOND, Time, Unit};
 use crate::written::{Clock, NO_TIME, Order, Problem, Syntax};
+use jiff::fmt::strtime;
+use std::collections::HashSet;
 
-fn has_date_name(names: &[&str]) -> bool {
+/// Whether the one column is called as dates are.
+pub(crate) fn has_date_name(names: &[&str]) -> bool {
     let is_date = |name: &&str| {
         let lower = name.to_lowercase();
         ["date", "datum", "fecha", "yyyyddd", "day"]
@@ -26,8 +29,10 @@ pub(crate) fn by_name(names: &[&str], cells: &[&str]) -> Option<Syntax> {
         Some(Syntax::Date(Order::Ymd))
     } else if are_minutes(names, cells) {
         Some(Syntax::Format("%M:%S%.f".to_owned()))
+    } else if are_digits_of_time(names, cells, 4) && cells.iter().all(|cell| is_written(cell, 4, "%H%M")) {
+        Some(Syntax::Format("%H%M".to_owned()))
     } else {
-        let is_time = is_of_day_name(names) || are_digits_of_time(names, cells);
+        let is_time = is_of_day_name(names) || are_digits_of_time(names, cells, 6);
         (is_time && cells.iter().all(|cell| civil::of_digits(cell).is_some())).then_some(Syntax::OfDay)
     }
 }
@@ -44,10 +49,10 @@ fn are_minutes(names: &[&str], cells: &[&str]) -> bool {
     is_said && cells.iter().all(|cell| cell.matches(':').count() == 1)
 }
 
-/// Whether a column of the time has numbers of six digits, some behind a zero, as `095800`, which counts do not have.
-fn are_digits_of_time(names: &[&str], cells: &[&str]) -> bool {
+/// Whether a column of the time has numbers of so many digits, some behind a zero, as `095800`, which counts do not have.
+fn are_digits_of_time(names: &[&str], cells: &[&str], digits: usize) -> bool {
     matches!(names, [name] if OF_DAY.contains(&name.to_lowercase().as_str()))
-        && cells.iter().all(|cell| cell.len() == 6)
+        && cells.iter().all(|cell| cell.len() == digits)
         && cells.iter().any(|cell| cell.starts_with('0'))
 }
 
@@ -97,6 +102,30 @@ pub(crate) fn may_be_days(names: &[&str], cells: &[&str]) -> bool {
     let is_share = |cell: &&str| cell.split_once('.').is_some_and(|(_, places)| places.len() >= 5);
     (has_date_name(names) && within(20_000.0, 80_000.0))
         || (names.len() == 1 && cells.iter().any(is_share) && within(36_500.0, 55_000.0))
+}
+
+/// Whether so many digits have the parts of a format.
+fn is_written(cell: &str, digits: usize, format: &str) -> bool {
+    cell.len() == digits && cell.bytes().all(|c| c.is_ascii_digit()) && strtime::parse(format, cell).is_ok()
+}
+
+/// Whether numbers are likely dates without marks that begin with a day or with a year of two digits: `240305` in a column of dates,
+/// `2403050958` and `05032024095800` in any. Numbers that count something do not all have such parts; up to 60 seconds since 1970 can.
+pub(crate) fn may_be_compact(names: &[&str], cells: &[&str]) -> bool {
+    const DATES: [(usize, &str); 4] = [(6, "%y%m%d"), (6, "%d%m%y"), (6, "%m%d%y"), (8, "%d%m%Y")];
+    const TIMES: [(usize, &str); 3] = [(0, ""), (4, "%H%M"), (6, "%H%M%S")];
+    let times = if has_date_name(names) { &TIMES[..] } else { &TIMES[1..] };
+    let is_one = |(date, time): ((usize, &str), &(usize, &str))| {
+        let format = format!("{}{}", date.1, time.1);
+        cells.iter().all(|cell| is_written(cell, date.0 + time.0, &format))
+    };
+    let is_recent = |cell: &&str| cell.parse().is_ok_and(|x: f64| (1e9..2.1e9).contains(&x));
+    let may_count = cells.iter().all(is_recent) && cells.iter().collect::<HashSet<_>>().len() < 60;
+    !cells.is_empty()
+        && !may_count
+        && DATES
+            .into_iter()
+            .any(|date| times.iter().any(|time| is_one((date, time))))
 }
 
 impl Clock {

@@ -48,6 +48,10 @@ pub(crate) const JULIAN: Problem = (
     "may be a Julian date, a number of days",
     "say --time-format jd (or mjd), or --time-format s if these are seconds",
 );
+pub(crate) const COMPACT: Problem = (
+    "may be a date whose digits have no marks",
+    "say its format, as --time-format %y%m%d%H%M or %d%m%Y, or --time-format s if these are seconds",
+);
 pub(crate) const FAR: Problem = (
     "is behind the year 2200 if it counts parts of a second since 1970",
     "say --time-format ms, us or ns if it does, s if these are seconds; or convert the column, which may count from another year",

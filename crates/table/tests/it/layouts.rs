@@ -85,6 +85,8 @@ fn names_tell_minutes_from_hours() {
         assert_eq!(read[1], expected, "{name}");
     }
     assert_eq!(times("time,x\n095800,1\n100001,2\n", &[], None).unwrap(), ["35880", "36001"]);
+    assert_eq!(times("time,x\n0958,1\n1001,2\n", &[], None).unwrap(), ["35880", "36060"]);
+    assert_eq!(times("time,x\n1958,1\n2001,2\n", &[], None).unwrap(), ["1958", "2001"]);
     assert_eq!(times("time,x\n195800,1\n200001,2\n", &[], None).unwrap(), ["195800", "200001"]);
 }
 
@@ -99,6 +101,41 @@ fn times_of_further_spellings() {
         let text = format!("time,x\n{},1\n{},2\n", cells[0], cells[1]);
         assert_eq!(times(&text, &[], None).unwrap(), expected, "{text}");
     }
+}
+
+/// Dates of digits without marks that begin with a day or with a year of two digits are asked for; numbers that cannot be such dates count.
+#[test]
+fn dates_of_digits_without_a_century_are_asked_for() {
+    for (name, first, second, format) in [
+        ("time", "2403050958", "2403051000", "%y%m%d%H%M"),
+        ("time", "240305095800", "240305100000", "%y%m%d%H%M%S"),
+        ("t", "0503240958", "0503241000", "%d%m%y%H%M"),
+        ("time", "050320240958", "050320241000", "%d%m%Y%H%M"),
+        ("time", "05032024095800", "05032024100000", "%d%m%Y%H%M%S"),
+        ("timestamp", "0305240958", "0305241000", "%m%d%y%H%M"),
+    ] {
+        let text = format!("{name},x\n{first},1\n{second},2\n");
+        let message = times(&text, &[name], None).unwrap_err();
+        assert!(message.contains("digits have no marks") && message.contains("--time-format"), "{first}: {message}");
+        assert_eq!(times(&text, &[name], Some(format)).unwrap()[1], "2024-03-05T10:00:00", "{first}");
+        assert_eq!(times(&text, &[name], Some("s")).unwrap()[0], first.trim_start_matches('0'));
+    }
+    let message = times("date,x\n240305,1\n240306,2\n", &[], None).unwrap_err();
+    assert!(message.contains("digits have no marks"), "{message}");
+    let message = times("date,time,x\n240305,0958,1\n240305,1000,2\n", &[], None).unwrap_err();
+    assert!(message.contains("--time-format"), "{message}");
+    // Seconds since 1970 whose digits are also a date, a count of seconds, and one of milliseconds.
+    for (first, second) in [
+        ("1701231215", "1701231216"),
+        ("240305", "240306"),
+        ("2403050998", "2403051008"),
+    ] {
+        assert_eq!(times(&format!("time,x\n{first},1\n{second},2\n"), &["time"], None).unwrap()[0], first);
+    }
+    let rows: String = (0..200)
+        .map(|i| format!("170123{:02}{:02},1\n", 9 + i / 60, i % 60))
+        .collect();
+    assert!(times(&format!("time,x\n{rows}"), &["time"], None).is_err(), "200 of 2017");
 }
 
 #[test]
