@@ -75,8 +75,15 @@ fn date(text: &str, order: Order) -> Option<(Result<Date, Problem>, &str)> {
     }
     if length == 4 && next == ':' {
         // `2024:065:21:30:00`
-        let (day, count, rest) = digits(&rest[1..], 3)?;
-        return (count == 3 && rest.starts_with(':')).then(|| (day_of_year(first, day), rest));
+        let (second, count, rest) = digits(&rest[1..], 3)?;
+        if count == 3 {
+            return rest.starts_with(':').then(|| (day_of_year(first, second), rest));
+        }
+        // `2024:03:05 21:30:00`, as cameras write it
+        let (day, _, rest) = digits(rest.strip_prefix(':')?, 2)?;
+        return rest
+            .starts_with([' ', 'T'])
+            .then(|| (checked(first, second, day), rest));
     }
     // `05MAR2024`
     let mark = if next.is_ascii_alphabetic() && length <= 2 {
@@ -85,7 +92,7 @@ fn date(text: &str, order: Order) -> Option<(Result<Date, Problem>, &str)> {
         &rest[..rest
             .chars()
             .next()
-            .filter(|mark| matches!(mark, '-' | '/' | '.' | ' '))?
+            .filter(|mark| matches!(mark, '-' | '/' | '.' | ' ' | ':'))?
             .len_utf8()]
     };
     let rest = &rest[mark.len()..];
@@ -110,6 +117,10 @@ fn date(text: &str, order: Order) -> Option<(Result<Date, Problem>, &str)> {
     }
     let rest = rest.strip_prefix(mark)?;
     let (third, third_length, rest) = digits(rest, 4)?;
+    // Two digits each with colons are a time of day.
+    if mark == ":" && third_length != 4 {
+        return None;
+    }
     let (year, month, day, year_length) = match (length, month, order) {
         (4, _, _) => (first, second, third, 4),
         (_, Some(_), _) | (_, _, Order::Dmy) => (third, second, first, third_length),
@@ -191,7 +202,11 @@ pub(crate) fn of_day(text: &str) -> Option<(i64, i128, bool, &str)> {
     let (minutes, _, mut rest) = digits(rest.strip_prefix(':')?, 2)?;
     let (mut seconds, mut parts) = (0, 0);
     if let Some(behind) = rest.strip_prefix(':') {
-        let (value, _, behind) = digits(behind, 2)?;
+        let (value, count, behind) = digits(behind, 4)?;
+        // Four digits are the year of `05:03:2024`.
+        if count > 2 {
+            return None;
+        }
         seconds = value;
         rest = behind;
         // Three digits behind a further colon are thousandths.

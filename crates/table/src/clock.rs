@@ -2,12 +2,12 @@
 
 use crate::civil;
 use crate::column::{Column, Kind};
-use crate::days::{by_name, has_date_name, may_be_compact, may_be_days, may_be_julian};
+use crate::days::{self, by_name, has_date_name, may_be_compact, may_be_days, may_be_julian};
 use crate::dialect::Dialect;
 use crate::error::Error;
 use crate::guess::{self, Doubt};
 use crate::interval;
-use crate::named::{NAMES, OF_DAY, is_exact_name, is_time_name};
+use crate::named::{NAMES, OF_DAY, is_exact_name, is_time_name, starts_an_interval};
 use crate::parts::{Part, calendar, is_hour_and_minute, monthly, of_day_parts, parts};
 use crate::time::{Scale, Unit};
 use crate::written::{self, Clock, Order, Problem, Syntax};
@@ -69,7 +69,10 @@ fn says(column: &Column, sample: &[String], has_named: bool) -> Says {
     let is_of_day = |cell: &&str| civil::of_day(cell.trim()).is_some();
     if cells.iter().all(is_of_day) {
         Says::OfDay
-    } else if cells.iter().any(|cell| cell.contains(':') || cell.len() > 16) {
+    } else if cells
+        .iter()
+        .any(|cell| (cell.contains(':') && cell.len() > 10) || cell.len() > 16)
+    {
         Says::Date
     } else {
         Says::Day
@@ -96,9 +99,10 @@ pub(crate) fn guess(
     let of = |what: Says| (0..said.len()).filter(|i| said[*i] == what).collect::<Vec<usize>>();
     let (dates, days, clocks) = (of(Says::Date), of(Says::Day), of(Says::OfDay));
     if let ([], [day], [_, ..]) = (dates.as_slice(), days.as_slice(), clocks.as_slice()) {
+        let is_start = |clock: &usize| starts_an_interval(&columns[*clock].own_name);
         let beside = clocks
-            .first()
-            .filter(|clock| clocks.len() == 1 && clock.abs_diff(*day) == 1);
+            .iter()
+            .find(|clock| clock.abs_diff(*day) == 1 && (clocks.len() == 1 || is_start(clock)));
         let by_name = clocks
             .iter()
             .find(|clock| OF_DAY.contains(&columns[**clock].own_name.to_lowercase().as_str()));
@@ -230,16 +234,17 @@ pub(crate) fn clock(
             scale,
             takes_leap_seconds: false,
             cuts: false,
+            parts_behind: None,
         });
     }
     if syntax == Syntax::Number(Unit::Seconds) && dialect.time_format.is_none() && may_be_days(names, &cells) {
-        return Err(Refused::Cell(0, written::DAYS));
+        return Err(Refused::Cell(0, days::DAYS));
     }
     if syntax == Syntax::Number(Unit::Seconds) && dialect.time_format.is_none() && may_be_julian(names, &cells) {
-        return Err(Refused::Cell(0, written::JULIAN));
+        return Err(Refused::Cell(0, days::JULIAN));
     }
     if matches!(syntax, Syntax::Number(_)) && dialect.time_format.is_none() && may_be_compact(names, &cells) {
-        return Err(Refused::Cell(0, written::COMPACT));
+        return Err(Refused::Cell(0, days::COMPACT));
     }
     let largest = || {
         cells
@@ -303,6 +308,7 @@ pub(crate) fn clock(
         scale,
         takes_leap_seconds: false,
         cuts: false,
+        parts_behind: None,
     })
 }
 

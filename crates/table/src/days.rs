@@ -1,12 +1,26 @@
-//! Whether numbers are likely days: of a year, of spreadsheets, or Julian dates; times as numbers of units.
+//! Whether numbers are likely days: of a year, of spreadsheets, or Julian dates; times as numbers of units, and of a date with numbers behind it.
 
 use crate::civil;
 use crate::interval;
 use crate::named::OF_DAY;
+use crate::parts::Part;
 use crate::time::{SECOND, Time, Unit};
-use crate::written::{Clock, NO_TIME, Order, Problem, Syntax};
+use crate::written::{Clock, NO_TIME, Order, Problem, Syntax, number};
 use jiff::fmt::strtime;
 use std::collections::HashSet;
+
+pub(crate) const DAYS: Problem = (
+    "may be a number of days, as spreadsheets have them",
+    "say --time-format excel, or --time-format s if these are seconds",
+);
+pub(crate) const JULIAN: Problem = (
+    "may be a Julian date, a number of days",
+    "say --time-format jd (or mjd), or --time-format s if these are seconds",
+);
+pub(crate) const COMPACT: Problem = (
+    "may be a date whose digits have no marks",
+    "say its format, as --time-format %y%m%d%H%M or %d%m%Y, or --time-format s if these are seconds",
+);
 
 /// Whether the one column is called as dates are.
 pub(crate) fn has_date_name(names: &[&str]) -> bool {
@@ -146,5 +160,34 @@ impl Clock {
             Some(part) => self.number(number, part),
             None => self.since(number, interval::seconds(unit).unwrap_or(1), 0),
         }
+    }
+}
+
+impl Clock {
+    /// A date in the first cell, and hour, minute and second in those behind it.
+    pub(crate) fn date_and(&self, cells: &[&str], order: Order, behind: &[Part]) -> Result<Time, Problem> {
+        let (date, rest) = cells.split_first().ok_or(NO_TIME)?;
+        let found = civil::written(date, order).ok_or(NO_TIME)?;
+        if found.second != 0 || found.fraction != 0 || rest.len() != behind.len() {
+            return Err(NO_TIME);
+        }
+        let (mut second, mut fraction) = (0, 0);
+        for (cell, part) in rest.iter().zip(behind) {
+            let time = number(cell.trim(), Unit::Seconds)?;
+            let whole = i64::try_from(time.0.div_euclid(SECOND)).map_err(|_| NO_TIME)?;
+            let (unit, most) = match part {
+                Part::Hour => (3600, 24),
+                Part::Minute => (60, 59),
+                _ => (1, 59),
+            };
+            if !(0..=most).contains(&whole) || (time.0.rem_euclid(SECOND) != 0 && *part != Part::Second) {
+                return Err(NO_TIME);
+            }
+            (second, fraction) = (second + unit * whole, time.0.rem_euclid(SECOND));
+        }
+        if second > 86_400 {
+            return Err(NO_TIME);
+        }
+        self.placed(found.date?, second, fraction, &found.zone)
     }
 }

@@ -37,6 +37,7 @@ pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Doubt>> {
         scale,
         takes_leap_seconds: true,
         cuts: true,
+        parts_behind: None,
     };
     let all = |syntax: Syntax| {
         let utc = clock(syntax.clone(), Scale::Utc);

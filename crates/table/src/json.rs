@@ -3,6 +3,7 @@
 
 use crate::error::{Error, Place, printable};
 use crate::lines::{Line, Row};
+use crate::named::is_time_name;
 
 /// Largest depth of objects and lists.
 const MAX_DEPTH: usize = 16;
@@ -21,6 +22,30 @@ pub(crate) fn flattened(line: &str, number: u64) -> Result<Vec<(String, String)>
     };
     let done = reader.value("", 0, &mut pairs).is_some() && reader.peek().is_none();
     if done { Ok(pairs) } else { Err(refused(reader.at)) }
+}
+
+/// The pairs of the only object, if it is a row: it has no lists of one length, one of them of times, which are columns.
+pub(crate) fn alone(pairs: Vec<(String, String)>) -> Result<Vec<(String, String)>, Error> {
+    let mut lists: Vec<(&str, usize)> = Vec::new();
+    for (key, _) in &pairs {
+        let Some((name, _)) = key.rsplit_once('.').filter(|(_, index)| index.parse::<usize>().is_ok()) else {
+            continue;
+        };
+        match lists.last_mut().filter(|(last, _)| *last == name) {
+            Some((_, count)) => *count += 1,
+            None => lists.push((name, 1)),
+        }
+    }
+    let is_time = |(name, rows): &&(&str, usize)| *rows > 1 && is_time_name(name.rsplit('.').next().unwrap_or(name));
+    let rows = lists.iter().find(is_time).map(|(_, rows)| rows);
+    if rows.is_some_and(|rows| lists.iter().filter(|(_, count)| count == rows).count() > 1) {
+        return Err(Error::Format {
+            what: "JSON, a list for each column",
+            mend: "make a table of it: jq -r 'keys_unsorted, ([.[]] | transpose[]) | @csv' FILE | fewbits ... -, with `.hourly | ` \
+                   before it, or the like, if the lists stand in an object",
+        });
+    }
+    Ok(pairs)
 }
 
 /// A row of an object: a cell for each key.

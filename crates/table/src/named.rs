@@ -83,3 +83,20 @@ pub(crate) fn is_time_name(name: &str) -> bool {
             .iter()
             .any(|end| lower.ends_with(end))
 }
+
+/// Whether a word of a name says that an interval begins, as `START TIME` beside `END TIME`.
+pub(crate) fn starts_an_interval(name: &str) -> bool {
+    const WORDS: [&str; 8] = [
+        "start",
+        "begin",
+        "beginning",
+        "from",
+        "beginn",
+        "von",
+        "anfang",
+        "inicio",
+    ];
+    let lower = name.to_lowercase();
+    let mut words = lower.split(|c: char| !c.is_alphanumeric());
+    words.any(|word| WORDS.contains(&word))
+}

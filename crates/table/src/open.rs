@@ -206,8 +206,10 @@ fn lines_of(head: &Head, reader: Box<dyn BufRead + Send>) -> Lines {
 
 fn of_json(head: &Head, reader: Box<dyn BufRead + Send>, dialect: &mut Dialect) -> Result<(Rows, Vec<Column>), Error> {
     let mut keys: Vec<String> = Vec::new();
-    for (number, line) in head.lines.iter().filter(|(_, line)| !line.trim().is_empty()) {
+    let lines = || head.lines.iter().filter(|(_, line)| !line.trim().is_empty());
+    for (number, line) in lines() {
         let pairs = match json::flattened(line, *number) {
+            Ok(pairs) if lines().nth(1).is_none() => json::alone(pairs)?,
             Ok(pairs) => pairs,
             Err(_) if *number > 1 => continue,
             Err(_) => {

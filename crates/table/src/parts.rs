@@ -1,6 +1,7 @@
 //! Dates in several columns: which columns give one, and what each of them means.
 
 use crate::column::Column;
+use crate::time::SECOND;
 
 /// Meaning of a column of a part of a date.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -159,4 +160,85 @@ pub(crate) fn padded(cell: &str) -> std::borrow::Cow<'_, str> {
         return format!("{cell:0>width$}").into();
     }
     cell.into()
+}
+
+/// Decimals of a second that the last word of a name counts, and what stands before it: 9 and `stamp` of `stamp.nsecs`.
+fn counted(name: &str) -> (Option<u8>, String) {
+    const WORDS: [(u8, &[&str]); 4] = [
+        (0, &["s", "sec", "secs", "second", "seconds"]),
+        (3, &["ms", "msec", "msecs", "millis", "millisecond", "milliseconds"]),
+        (
+            6,
+            &[
+                "us",
+                "usec",
+                "usecs",
+                "micros",
+                "microsec",
+                "microsecond",
+                "microseconds",
+            ],
+        ),
+        (
+            9,
+            &[
+                "ns",
+                "nsec",
+                "nsecs",
+                "nanos",
+                "nanosec",
+                "nanosecs",
+                "nanosecond",
+                "nanoseconds",
+            ],
+        ),
+    ];
+    let lower = name.to_lowercase();
+    let (before, word) = lower.rsplit_once(['.', '_', '/', ' ']).unwrap_or(("", &lower));
+    let found = WORDS.iter().find(|(_, words)| words.contains(&word));
+    (found.map(|(decimals, _)| *decimals), before.to_owned())
+}
+
+/// Decimals of parts of a second, by the name of their column.
+pub(crate) fn decimals_named(name: &str) -> Option<u8> {
+    counted(name).0.filter(|decimals| *decimals > 0)
+}
+
+/// Parts of a second of so many decimals, as attoseconds.
+pub(crate) fn parts_of_second(cell: &str, decimals: u8) -> Option<i128> {
+    let count = cell.trim().parse::<u32>().ok().map(i128::from)?;
+    let unit = SECOND / 10_i128.pow(u32::from(decimals));
+    Some(count * unit).filter(|parts| *parts < SECOND)
+}
+
+/// The column behind those of the time, if it counts parts of their seconds: by both names, as `stamp.sec, stamp.nanosec`, or since it
+/// increases wherever the times stay equal.
+pub(crate) fn parts_behind(columns: &[Column], samples: &[&[String]], time: &[usize]) -> Option<usize> {
+    let last = *time.last()?;
+    let (column, cells) = (columns.get(last + 1)?, samples.get(last + 1)?);
+    let decimals = decimals_named(&column.own_name)?;
+    let parts: Vec<i128> = cells
+        .iter()
+        .map(|cell| parts_of_second(cell, decimals))
+        .collect::<Option<_>>()?;
+    let (unit, before) = counted(&columns[last].own_name);
+    let is_whole = |cell: &String| cell.bytes().all(|c| c.is_ascii_digit());
+    let by_name = unit == Some(0) && before == counted(&column.own_name).1 && samples[last].iter().all(is_whole);
+    let of = |row: usize| time.iter().map(move |i| samples[*i].get(row));
+    let (mut equal, mut increases) = (0, true);
+    for row in 1..parts.len() {
+        if of(row).eq(of(row - 1)) {
+            equal += 1;
+            increases &= parts[row] > parts[row - 1];
+        }
+    }
+    (!parts.is_empty() && (by_name || (equal > 0 && increases))).then_some(last + 1)
+}
+
+/// A column of whole seconds with that of their parts behind it, by their names.
+pub(crate) fn seconds_and_parts(columns: &[Column], samples: &[&[String]]) -> Option<Vec<usize>> {
+    let is_seconds = |i: &usize| counted(&columns[*i].own_name).0 == Some(0);
+    (0..columns.len())
+        .filter(is_seconds)
+        .find_map(|i| parts_behind(columns, samples, &[i]).map(|behind| vec![i, behind]))
 }

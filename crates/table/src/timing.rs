@@ -41,8 +41,14 @@ impl Table {
     fn find(&mut self, is_certain: bool) -> Result<bool, Error> {
         let samples: Vec<&[String]> = self.profiles.iter().map(|profile| profile.sample.as_slice()).collect();
         match clock::guess(&self.columns, &samples, &self.dialect, is_certain) {
-            Some(columns) => self.set_time_columns(columns).map(|()| true),
-            None => Ok(false),
+            Some(mut columns) => {
+                columns.extend(parts::parts_behind(&self.columns, &samples, &columns));
+                self.set_time_columns(columns).map(|()| true)
+            }
+            None => match parts::seconds_and_parts(&self.columns, &samples) {
+                Some(columns) => self.set_time_columns(columns).map(|()| true),
+                None => Ok(false),
+            },
         }
     }
 
@@ -92,23 +98,36 @@ impl Table {
             }
         };
         let own: Vec<String> = columns.iter().map(own).collect();
-        let own: Vec<&str> = own.iter().map(String::as_str).collect();
+        let mut own: Vec<&str> = own.iter().map(String::as_str).collect();
+        // Parts of a second stand behind the time that is read from the columns before them.
+        let decimals = own.last().and_then(|name| parts::decimals_named(name));
+        let are_parts = |decimals: &u8| {
+            let cells = &self.profiles[columns[columns.len() - 1]].sample;
+            columns.len() > 1
+                && cells
+                    .iter()
+                    .all(|cell| parts::parts_of_second(cell, *decimals).is_some())
+        };
+        let decimals = decimals.filter(are_parts);
+        let whole = &columns[..columns.len() - usize::from(decimals.is_some())];
+        own.truncate(whole.len());
         let length = columns
             .iter()
             .map(|i| self.profiles[*i].sample.len())
             .min()
             .unwrap_or(0);
         let joined = |row: usize| {
-            let cells: Vec<&str> = columns.iter().map(|i| self.profiles[*i].sample[row].as_str()).collect();
+            let cells: Vec<&str> = whole.iter().map(|i| self.profiles[*i].sample[row].as_str()).collect();
             parts::joined(&cells)
         };
         let sample: Vec<String> = (0..length).map(joined).collect();
-        let are_hours = match columns.as_slice() {
+        let are_hours = match whole {
             [date, hour] => parts::are_hours(&self.profiles[*date].sample, &self.profiles[*hour].sample),
             _ => None,
         };
         let found = clock::clock(&own, &sample, are_hours, &mut self.dialect);
-        let found = found.map_err(|refused| self.time_refused(&columns, &sample, refused))?;
+        let mut found = found.map_err(|refused| self.time_refused(whole, &sample, refused))?;
+        found.parts_behind = decimals;
         self.dialect.time_column = columns.iter().map(|i| self.columns[*i].name.clone()).collect();
         self.selected.retain(|column| !columns.contains(column));
         self.time = Some((columns, found));

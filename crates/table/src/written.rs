@@ -4,7 +4,7 @@ use crate::calendar;
 use crate::civil::{self, Zone, offset};
 pub(crate) use crate::civil::{AMBIGUOUS, NO_SUCH_DATE, Order, Problem};
 use crate::interval;
-use crate::parts::{Part, joined, padded};
+use crate::parts::{Part, joined, padded, parts_of_second};
 use crate::quick;
 use crate::time::{DECIMALS, SECOND, Scale, Time, Unit};
 use jiff::civil::{Date, DateTime};
@@ -40,18 +40,6 @@ const TOO_FINE: Problem =
     ("has more decimals of a second than the 18 that are kept", "allow an error of times, as --time ±2ns");
 pub(crate) const NAMED_ZONE: Problem =
     ("names a zone by letters that several zones share", "say its region, as --time-zone Europe/Berlin");
-pub(crate) const DAYS: Problem = (
-    "may be a number of days, as spreadsheets have them",
-    "say --time-format excel, or --time-format s if these are seconds",
-);
-pub(crate) const JULIAN: Problem = (
-    "may be a Julian date, a number of days",
-    "say --time-format jd (or mjd), or --time-format s if these are seconds",
-);
-pub(crate) const COMPACT: Problem = (
-    "may be a date whose digits have no marks",
-    "say its format, as --time-format %y%m%d%H%M or %d%m%Y, or --time-format s if these are seconds",
-);
 pub(crate) const FAR: Problem = (
     "is behind the year 2200 if it counts parts of a second since 1970",
     "say --time-format ms, us or ns if it does, s if these are seconds; or convert the column, which may count from another year",
@@ -67,7 +55,7 @@ const DOUBTFUL: Problem = (
 );
 
 /// A plain number of units as attoseconds.
-fn number(text: &str, unit: Unit) -> Result<Time, Problem> {
+pub(crate) fn number(text: &str, unit: Unit) -> Result<Time, Problem> {
     let (negative, size) = match text.strip_prefix('-') {
         Some(size) => (true, size),
         None => (false, text.strip_prefix('+').unwrap_or(text)),
@@ -123,6 +111,8 @@ pub(crate) struct Clock {
     pub(crate) takes_leap_seconds: bool,
     /// Whether decimals beyond the 18th may be cut.
     pub(crate) cuts: bool,
+    /// The last of several columns counts parts of a second of so many decimals, as `Milliseconds` and `nsecs` do.
+    pub(crate) parts_behind: Option<u8>,
 }
 
 /// A zone by its name or offset.
@@ -145,6 +135,7 @@ impl Clock {
             scale,
             takes_leap_seconds: false,
             cuts: false,
+            parts_behind: None,
         }
     }
 
@@ -238,7 +229,7 @@ impl Clock {
     }
 
     /// A civil time on its clock: with its own offset, that of the zone, or none.
-    fn placed(&self, date: Date, second: i64, fraction: i128, zone: &Zone) -> Result<Time, Problem> {
+    pub(crate) fn placed(&self, date: Date, second: i64, fraction: i128, zone: &Zone) -> Result<Time, Problem> {
         let seconds = civil_seconds(date, second);
         match (zone, &self.zone, self.scale) {
             (Zone::Unknown, ..) => Err(NO_TIME),
@@ -305,6 +296,16 @@ impl Clock {
 
     /// The time of parts of a date in cells of their own, or of a date and a time of day in two cells.
     pub(crate) fn of_parts(&self, cells: &[&str]) -> Result<Time, Problem> {
+        if let (Some(decimals), [whole @ .., behind]) = (self.parts_behind, cells) {
+            let whole = self.of_whole(whole)?;
+            let count = parts_of_second(behind, decimals).ok_or(NO_TIME)?;
+            let is_whole = whole.0.rem_euclid(SECOND) == 0;
+            return is_whole.then_some(Time(whole.0 + count)).ok_or(NO_TIME);
+        }
+        self.of_whole(cells)
+    }
+
+    fn of_whole(&self, cells: &[&str]) -> Result<Time, Problem> {
         let (meaning, ends) = match &self.syntax {
             Syntax::Parts(meaning, ends) => (meaning, ends),
             Syntax::DateAnd(order, behind) => return self.date_and(cells, *order, behind),
@@ -351,35 +352,6 @@ impl Clock {
         // In weather years, hour 1 is the first hour of a day, and minute 60 its end.
         let hour = if *ends { hour - 1 } else { hour };
         self.placed(date, hour * 3600 + minute * 60 + second + of_day, fraction, &Zone::Nothing)
-    }
-}
-
-impl Clock {
-    /// A date in the first cell, and hour, minute and second in those behind it.
-    fn date_and(&self, cells: &[&str], order: Order, behind: &[Part]) -> Result<Time, Problem> {
-        let (date, rest) = cells.split_first().ok_or(NO_TIME)?;
-        let found = civil::written(date, order).ok_or(NO_TIME)?;
-        if found.second != 0 || found.fraction != 0 || rest.len() != behind.len() {
-            return Err(NO_TIME);
-        }
-        let (mut second, mut fraction) = (0, 0);
-        for (cell, part) in rest.iter().zip(behind) {
-            let time = number(cell.trim(), Unit::Seconds)?;
-            let whole = i64::try_from(time.0.div_euclid(SECOND)).map_err(|_| NO_TIME)?;
-            let (unit, most) = match part {
-                Part::Hour => (3600, 24),
-                Part::Minute => (60, 59),
-                _ => (1, 59),
-            };
-            if !(0..=most).contains(&whole) || (time.0.rem_euclid(SECOND) != 0 && *part != Part::Second) {
-                return Err(NO_TIME);
-            }
-            (second, fraction) = (second + unit * whole, time.0.rem_euclid(SECOND));
-        }
-        if second > 86_400 {
-            return Err(NO_TIME);
-        }
-        self.placed(found.date?, second, fraction, &found.zone)
     }
 }
 

@@ -11,6 +11,7 @@ fn clock(syntax: Syntax, scale: Scale) -> Clock {
         scale,
         takes_leap_seconds: false,
         cuts: false,
+        parts_behind: None,
     }
 }
 

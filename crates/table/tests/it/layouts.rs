@@ -9,6 +9,11 @@ fn lines(header: &str, count: usize, row: impl Fn(usize) -> String) -> String {
 
 /// The times of a table as text, or why there are none.
 fn times(text: &str, columns: &[&str], format: Option<&str>) -> Result<Vec<String>, String> {
+    times_to(0, text, columns, format)
+}
+
+/// Times with so many decimals.
+fn times_to(decimals: u8, text: &str, columns: &[&str], format: Option<&str>) -> Result<Vec<String>, String> {
     let said = Dialect {
         time_format: format.map(str::to_owned),
         ..Dialect::default()
@@ -21,7 +26,7 @@ fn times(text: &str, columns: &[&str], format: Option<&str>) -> Result<Vec<Strin
     .map_err(|error| error.to_string())?;
     let batch = rows(&mut table);
     let scale = table.time().ok_or("no time")?.1;
-    Ok(batch.times.iter().map(|time| time.shown(scale, 0)).collect())
+    Ok(batch.times.iter().map(|time| time.shown(scale, decimals)).collect())
 }
 
 #[test]
@@ -136,6 +141,80 @@ fn dates_of_digits_without_a_century_are_asked_for() {
         .map(|i| format!("170123{:02}{:02},1\n", 9 + i / 60, i % 60))
         .collect();
     assert!(times(&format!("time,x\n{rows}"), &["time"], None).is_err(), "200 of 2017");
+}
+
+/// Parts of a second in a column of their own, behind a time of any spelling; and columns that only have the name of such.
+#[test]
+fn parts_of_a_second_stand_in_a_column_of_their_own() {
+    for (text, expected) in [
+        (
+            "seq,stamp.sec,stamp.nanosec,x\n0,100,0,1\n1,100,500000000,2\n2,101,1,3\n",
+            ["100", "100.5", "101.000000001"],
+        ),
+        ("tv_sec,tv_usec,x\n100,0,1\n100,500000,2\n101,7,3\n", ["100", "100.5", "101.000007"]),
+        (
+            "Time,ms,x\n05.03.2024 09:58:00,0,1\n05.03.2024 09:58:00,500,2\n05.03.2024 09:58:01,1,3\n",
+            [
+                "2024-03-05T09:58:00.000000000",
+                "2024-03-05T09:58:00.500000000",
+                "2024-03-05T09:58:01.001000000",
+            ],
+        ),
+        (
+            "Year,Month,Day,Hour,Minute,Second,Millisecond\n2024,3,5,9,58,0,0\n2024,3,5,9,58,0,500\n2024,3,5,9,58,1,1\n",
+            [
+                "2024-03-05T09:58:00.000000000",
+                "2024-03-05T09:58:00.500000000",
+                "2024-03-05T09:58:01.001000000",
+            ],
+        ),
+        // Round trips in milliseconds, and a count that goes on.
+        ("time,ms\n10,23\n11,24\n12,22\n", ["10", "11", "12"]),
+        ("time,ms\n10,23\n10,22\n12,24\n", ["10", "10", "12"]),
+        ("time,stamp_ms\n10,10000\n10,10500\n11,11001\n", ["10", "10", "11"]),
+    ] {
+        assert_eq!(times_to(9, text, &[], None).unwrap(), expected, "{text}");
+    }
+    // What is said is taken, and a part beyond a second refused.
+    let text = "time,ms\n2024-03-05 09:58:00,23\n2024-03-05 09:58:01,24\n";
+    assert_eq!(times_to(3, text, &["time", "ms"], None).unwrap()[1], "2024-03-05T09:58:01.024");
+    let mut table = open(&lines("time,ms", 3000, |i| format!("{},{}", i / 10, if i == 2500 { 1000 } else { i % 10 })));
+    table.set_time(&["time", "ms"]).unwrap();
+    let message = refusal(&mut table);
+    assert!(message.contains("250 1000") && message.contains("2501"), "{message}");
+}
+
+/// An object whose lists are columns is no row; one with vectors is.
+#[test]
+fn lists_that_are_columns_are_no_row() {
+    for text in [
+        "{\"time\":[1,2],\"x\":[3.5,null]}",
+        "{\"lat\":52.5,\"hourly\":{\"time\":[\"2024-03-05T00:00\",\"2024-03-05T01:00\"],\"t_2m\":[3,4]}}\n",
+    ] {
+        let message = times(text, &[], None).unwrap_err();
+        assert!(message.contains("a list for each column") && message.contains("jq -r"), "{message}");
+    }
+    let mut table = open("{\"time\":1,\"a\":[1,2],\"b\":[3,4]}\n");
+    assert!(table.find_time().unwrap());
+    assert_eq!(rows(&mut table).columns.len(), 4);
+}
+
+#[test]
+fn dates_with_colons() {
+    let text = "DateTimeOriginal,x\n2024:03:05 09:58:00,1\n2024:03:15 09:58:01,2\n";
+    assert_eq!(times(text, &[], None).unwrap()[1], "2024-03-15T09:58:01");
+    let text = "Date(dd:mm:yyyy),Time(hh:mm:ss),x\n15:03:2024,09:58:00,1\n16:03:2024,09:58:01,2\n";
+    assert_eq!(times(text, &[], None).unwrap()[1], "2024-03-16T09:58:01");
+    let text = text.replace("15:03", "05:03").replace("16:03", "06:03");
+    assert!(times(&text, &[], None).unwrap_err().contains("--time-format dmy"));
+    // Durations stay.
+    assert_eq!(times("time,x\n2024:03:05,1\n", &["time"], None).unwrap(), ["7286585"]);
+}
+
+#[test]
+fn of_two_times_of_day_behind_a_date_the_first_is_taken() {
+    let text = "TYPE,DATE,START TIME,END TIME,USAGE\nuse,2024-03-05,00:00,00:59,.05\nuse,2024-03-05,01:00,01:59,.15\n";
+    assert_eq!(times(text, &[], None).unwrap(), ["2024-03-05T00:00:00", "2024-03-05T01:00:00"]);
 }
 
 #[test]
