@@ -38,15 +38,6 @@ impl Sign {
             Self::Below
         })
     }
-
-    /// The other sign.
-    #[inline]
-    pub fn flipped(self) -> Self {
-        match self {
-            Self::Below => Self::Above,
-            Self::Above => Self::Below,
-        }
-    }
 }
 
 impl TryFrom<i32> for Sign {
