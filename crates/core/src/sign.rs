@@ -38,6 +38,15 @@ impl Sign {
             Self::Below
         })
     }
+
+    /// The other sign.
+    #[inline]
+    pub fn flipped(self) -> Self {
+        match self {
+            Self::Below => Self::Above,
+            Self::Above => Self::Below,
+        }
+    }
 }
 
 impl TryFrom<i32> for Sign {

@@ -66,9 +66,14 @@ impl ModelGrid {
         }
     }
 
-    /// Number of models, at least one.
-    pub(crate) fn len(&self) -> usize {
+    /// Number of models.
+    pub fn len(&self) -> usize {
         self.sensors.len()
+    }
+
+    /// Never true: there is at least one model.
+    pub fn is_empty(&self) -> bool {
+        self.sensors.is_empty()
     }
 
     /// The instants at which the sensors sample, s.
