@@ -239,7 +239,7 @@ fn out_of_range(x: &[f64]) -> f64 {
 
 impl<const D: usize> FactoredGaussian<D> {
     /// The Gaussian without the factor.
-    pub fn gaussian(&self) -> &Gaussian<D> {
+    pub(crate) fn gaussian(&self) -> &Gaussian<D> {
         &self.gaussian
     }
 

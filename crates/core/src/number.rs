@@ -66,11 +66,6 @@ impl Levels {
         }
     }
 
-    /// Bits of a level's index.
-    pub fn bits(&self) -> u32 {
-        self.bits
-    }
-
     /// Largest index.
     fn top(&self) -> f64 {
         ((1_u64 << self.bits) - 1) as f64

@@ -69,28 +69,20 @@ impl Message for CellIndex {
 
 /// A sensor that reports the cell of its normalised innovation in the Lloyd-Max quantizer of the standard normal density.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Numbers", into = "Numbers")]
+#[serde(try_from = "Numbers")]
 pub struct InnovationWord {
     noise_variance: f64,
     bits: u32,
+    #[serde(skip_serializing)]
     quantizer: &'static LloydMax,
 }
 
 /// The stored form of [`InnovationWord`].
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Numbers {
     noise_variance: f64,
     bits: u32,
-}
-
-impl From<InnovationWord> for Numbers {
-    fn from(word: InnovationWord) -> Self {
-        Self {
-            noise_variance: word.noise_variance,
-            bits: word.bits,
-        }
-    }
 }
 
 impl TryFrom<Numbers> for InnovationWord {

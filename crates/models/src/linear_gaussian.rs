@@ -15,18 +15,23 @@ use serde::{Deserialize, Serialize};
 ///
 /// The noise covariance `Q = G diag(q) G'` has rank at most `U`. No function factors or inverts it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Parameters<D, U>", into = "Parameters<D, U>")]
+#[serde(try_from = "Parameters<D, U>")]
 pub struct LinearGaussian<const D: usize, const U: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
     transition: SMatrix<f64, D, D>,
+    #[serde(with = "fewbits_numerics::stored")]
     gain: SMatrix<f64, D, U>,
+    #[serde(with = "fewbits_numerics::stored")]
     noise_variances: SVector<f64, U>,
     /// `G diag(sqrt q)`, which turns standard normals into process noise.
+    #[serde(skip_serializing)]
     noise_factor: SMatrix<f64, D, U>,
+    #[serde(skip_serializing)]
     noise_covariance: SMatrix<f64, D, D>,
 }
 
 /// The stored form of [`LinearGaussian`].
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(rename = "LinearGaussian")]
 #[serde(deny_unknown_fields)]
 struct Parameters<const D: usize, const U: usize> {
@@ -36,16 +41,6 @@ struct Parameters<const D: usize, const U: usize> {
     gain: SMatrix<f64, D, U>,
     #[serde(with = "fewbits_numerics::stored")]
     noise_variances: SVector<f64, U>,
-}
-
-impl<const D: usize, const U: usize> From<LinearGaussian<D, U>> for Parameters<D, U> {
-    fn from(model: LinearGaussian<D, U>) -> Self {
-        Self {
-            transition: model.transition,
-            gain: model.gain,
-            noise_variances: model.noise_variances,
-        }
-    }
 }
 
 impl<const D: usize, const U: usize> TryFrom<Parameters<D, U>> for LinearGaussian<D, U> {

@@ -13,15 +13,18 @@ use serde::{Deserialize, Serialize};
 
 /// `M` measurements of a `D`-dimensional state: `z = H x + w`, `w ~ N(0, R)`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Parameters<D, M>", into = "Parameters<D, M>")]
+#[serde(try_from = "Parameters<D, M>")]
 pub struct LinearSensor<const D: usize, const M: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
     matrix: SMatrix<f64, M, D>,
+    #[serde(with = "fewbits_numerics::stored")]
     noise_covariance: SMatrix<f64, M, M>,
+    #[serde(skip_serializing)]
     noise_factor: SMatrix<f64, M, M>,
 }
 
 /// The stored form of [`LinearSensor`].
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(rename = "LinearSensor")]
 #[serde(deny_unknown_fields)]
 struct Parameters<const D: usize, const M: usize> {
@@ -29,15 +32,6 @@ struct Parameters<const D: usize, const M: usize> {
     matrix: SMatrix<f64, M, D>,
     #[serde(with = "fewbits_numerics::stored")]
     noise_covariance: SMatrix<f64, M, M>,
-}
-
-impl<const D: usize, const M: usize> From<LinearSensor<D, M>> for Parameters<D, M> {
-    fn from(sensor: LinearSensor<D, M>) -> Self {
-        Self {
-            matrix: sensor.matrix,
-            noise_covariance: sensor.noise_covariance,
-        }
-    }
 }
 
 impl<const D: usize, const M: usize> TryFrom<Parameters<D, M>> for LinearSensor<D, M> {

@@ -2,11 +2,13 @@
 
 use crate::deadline::Deadline;
 use crate::derivatives::Derivatives;
-use crate::error::Error;
+use crate::error::{Error, not_converged};
 use fewbits_numerics::error::{at_least_one, non_negative, positive};
 use nalgebra::{DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
+/// Name of the algorithm in errors.
+const NEWTON: &str = "Newton";
 /// Curvatures below this fraction of the largest are replaced by it, so that steps along flat directions stay finite.
 const CURVATURE_FLOOR: f64 = 1e-10;
 /// Relative amount by which a step may lower the objective, because of rounding.
@@ -165,7 +167,7 @@ pub(crate) fn ascend(
     let mut escapes = 0;
     for iteration in 1..=newton.max_iterations {
         if deadline.is_over() {
-            return Err(not_converged(iteration - 1, last_step));
+            return Err(not_converged(NEWTON, iteration - 1, last_step));
         }
         let here = objective.derivatives(b);
         let unit = objective.unit(here.value);
@@ -193,7 +195,7 @@ pub(crate) fn ascend(
                 last_step = f64::INFINITY;
                 let top = eigen.eigenvectors.column(eigen.eigenvalues.imax());
                 let off = top * (0.05 * scale / top.amax());
-                *b = moved(b, &off, &blocks, |_| true).ok_or_else(|| not_converged(iteration, longest))?;
+                *b = moved(b, &off, &blocks, |_| true).ok_or_else(|| not_converged(NEWTON, iteration, longest))?;
                 continue;
             }
             return Ok(Stationary {
@@ -211,17 +213,9 @@ pub(crate) fn ascend(
             values += usize::from(!trusted);
             trusted || objective.value(trial) >= floor
         });
-        *b = accepted.ok_or_else(|| not_converged(iteration, longest))?;
+        *b = accepted.ok_or_else(|| not_converged(NEWTON, iteration, longest))?;
     }
-    Err(not_converged(newton.max_iterations, last_step))
-}
-
-fn not_converged(iterations: usize, change: f64) -> Error {
-    Error::NotConverged {
-        algorithm: "Newton",
-        iterations,
-        change,
-    }
+    Err(not_converged(NEWTON, newton.max_iterations, last_step))
 }
 
 /// `b + step`, with the step halved until the result is increasing and accepted; `None` if this never happens.

@@ -22,28 +22,20 @@ use serde::{Deserialize, Serialize};
 /// # Ok::<(), fewbits_quantizers::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Stored", into = "Stored")]
+#[serde(try_from = "Stored")]
 pub struct Quantizer {
     pub(crate) breakpoints: Vec<f64>,
     pub(crate) labels: Vec<usize>,
+    #[serde(skip_serializing)]
     pub(crate) levels: usize,
 }
 
 /// The stored form of [`Quantizer`].
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Stored {
     breakpoints: Vec<f64>,
     labels: Vec<usize>,
-}
-
-impl From<Quantizer> for Stored {
-    fn from(quantizer: Quantizer) -> Self {
-        Self {
-            breakpoints: quantizer.breakpoints,
-            labels: quantizer.labels,
-        }
-    }
 }
 
 impl TryFrom<Stored> for Quantizer {

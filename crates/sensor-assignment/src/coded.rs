@@ -22,33 +22,28 @@ pub(crate) type Moments = (Vec<f64>, Vec<f64>);
 ///
 /// The constructor computes every bit's probabilities for every sensor's noise, so that errors of assignments take little time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredSensors", into = "StoredSensors")]
+#[serde(try_from = "StoredSensors")]
 pub struct CodedSensors {
+    #[serde(skip_serializing)]
     source: Source,
     half_width: f64,
     noise_deviations: Vec<f64>,
+    #[serde(skip_serializing)]
     quantizers: Vec<BinaryQuantizer>,
     /// Nodes on `[0, V]`, since the code is symmetric except for its first bit.
+    #[serde(skip_serializing)]
     pub(crate) nodes: Nodes,
     /// Probabilities of the bit's two values at the nodes: `[bit][sensor]`.
+    #[serde(skip_serializing)]
     pub(crate) probability: Vec<Vec<Table>>,
 }
 
 /// The stored form of [`CodedSensors`].
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StoredSensors {
     half_width: f64,
     noise_deviations: Vec<f64>,
-}
-
-impl From<CodedSensors> for StoredSensors {
-    fn from(sensors: CodedSensors) -> Self {
-        Self {
-            half_width: sensors.half_width,
-            noise_deviations: sensors.noise_deviations,
-        }
-    }
 }
 
 impl TryFrom<StoredSensors> for CodedSensors {

@@ -104,18 +104,6 @@ impl Source {
         }
     }
 
-    /// The source of `factor * X`.
-    ///
-    /// # Errors
-    /// If `factor` is not a positive number.
-    pub fn rescaled(&self, factor: f64) -> Result<Self, Error> {
-        let scale = factor * self.scale();
-        match self.kind {
-            Kind::Uniform { .. } => Self::uniform(scale),
-            Kind::Gaussian { .. } => Self::gaussian_with_deviation(scale),
-        }
-    }
-
     /// Variance: `V^2/3` for the uniform source.
     pub fn variance(&self) -> f64 {
         match self.kind {

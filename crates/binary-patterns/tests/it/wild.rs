@@ -21,7 +21,7 @@ proptest! {
     fn quantizers_and_grids_answer_numbers(x in prop::array::uniform8(wild()), bits in 0..6_usize, count in 0..5_usize) {
         for source in sources(x[0]) {
             prop_assert!(source.variance() >= 0.0 && !source.density(x[1]).is_nan() || x[1].is_nan(), "{:?} {}", source, x[1]);
-            for number in [source.noise_deviation(x[1]), source.rescaled(x[1]).map(|s| s.scale())].into_iter().flatten() {
+            if let Ok(number) = source.noise_deviation(x[1]) {
                 prop_assert!(!number.is_nan() && number >= 0.0, "{:?} {}: {}", source, x[1], number);
             }
         }

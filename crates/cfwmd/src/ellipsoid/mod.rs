@@ -16,31 +16,24 @@ use serde::{Deserialize, Serialize};
 
 /// The region of silence `nu' S^-1 nu < eta` of an innovation of `M` components.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Numbers<M>", into = "Numbers<M>")]
+#[serde(try_from = "Numbers<M>")]
 pub struct Ellipsoid<const M: usize> {
     /// `L` with `S = L L'`.
+    #[serde(skip_serializing)]
     lower: SMatrix<f64, M, M>,
+    #[serde(with = "fewbits_numerics::stored")]
     innovation_covariance: SMatrix<f64, M, M>,
     threshold: f64,
 }
 
 /// The stored form of [`Ellipsoid`].
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(rename = "Ellipsoid")]
 #[serde(deny_unknown_fields)]
 struct Numbers<const M: usize> {
     #[serde(with = "fewbits_numerics::stored")]
     innovation_covariance: SMatrix<f64, M, M>,
     threshold: f64,
-}
-
-impl<const M: usize> From<Ellipsoid<M>> for Numbers<M> {
-    fn from(region: Ellipsoid<M>) -> Self {
-        Self {
-            innovation_covariance: region.innovation_covariance,
-            threshold: region.threshold,
-        }
-    }
 }
 
 impl<const M: usize> TryFrom<Numbers<M>> for Ellipsoid<M> {

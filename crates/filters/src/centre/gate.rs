@@ -35,11 +35,6 @@ pub(super) struct Verdict {
     pub tested: Tested,
 }
 
-const UNTESTED: Tested = Tested {
-    is_possible: true,
-    residual: None,
-};
-
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// Decides which readings are used.
     ///
@@ -57,7 +52,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         };
         let of = |reading| Verdict {
             fate: first(reading),
-            tested: UNTESTED,
+            tested: Tested::without_residual(true),
         };
         let mut verdicts: Vec<Verdict> = readings.iter().map(of).collect();
         if self.health == Health::Off {

@@ -219,11 +219,16 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 events.push(Event::Readmitted(self.members[other].number));
             }
         }
-        self.members.iter_mut().for_each(|member| {
+        self.forget_all_tests();
+    }
+
+    /// Forgets the tests of all sensors, which were made against one that was wrong, and the centre's own.
+    fn forget_all_tests(&mut self) {
+        for member in &mut self.members {
             let astray = member.state.astray;
             member.state.forget_tests();
             member.state.astray = astray;
-        });
+        }
         self.monitor = health::Monitor::default();
     }
 
@@ -258,16 +263,12 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             if excluded < self.members.len() / 2 && others().count() > 0 {
                 if self.health == Health::Exclude {
                     // The others were judged against it.
-                    self.members.iter_mut().for_each(|member| {
-                        let astray = member.state.astray;
-                        member.state.forget_tests();
-                        member.state.astray = astray;
-                    });
+                    self.forget_all_tests();
                     self.members[seat].state.excluded = true;
                 } else {
                     self.members[seat].state.monitor = health::Monitor::default();
+                    self.monitor = health::Monitor::default();
                 }
-                self.monitor = health::Monitor::default();
                 events.push(Event::Excluded(number));
             }
             return;

@@ -2,7 +2,7 @@
 
 use super::health::Residual;
 use super::one_wrong::log_sum;
-use super::reading::{Content, Reading, Tested, WORD_BITS, conditioned, words};
+use super::reading::{Content, Reading, Tested, conditioned};
 use super::{FusionCentre, Member, RemoteSensor};
 use crate::Error;
 use crate::contract::{Points, StateFilter};
@@ -172,21 +172,17 @@ impl<const D: usize> Member<D> {
     }
 
     fn test_by_parts(&self, reading: &Reading<'_, D>, parts: Parts<'_, D>, log_weights: &[f64]) -> Tested {
-        let untested = |is_possible| Tested {
-            is_possible,
-            residual: None,
-        };
         let Some(known) = reading.known() else {
-            return untested(false);
+            return Tested::without_residual(false);
         };
         // An observation that cannot update a belief may still have a probability.
         let Some(found) = parts.evidence(known) else {
-            return untested(true);
+            return Tested::without_residual(true);
         };
         let total = log_sum(log_weights.iter().copied());
         let joint = log_weights.iter().zip(&found).map(|(weight, (log, _))| weight + log);
         if !(log_sum(joint) - total).is_finite() {
-            return untested(false);
+            return Tested::without_residual(false);
         }
         let weights: Vec<f64> = log_weights.iter().map(|log| (log - total).exp()).collect();
         let residual = match &reading.slot.observation {
@@ -231,29 +227,10 @@ impl<const D: usize> Member<D> {
                 .unzip();
             return self.residual_of_report(reading, &beliefs, weights, &measured, (&logs, &after));
         }
-        if received.bits() == 0 || received.bits() > WORD_BITS {
-            return None;
-        }
-        let (mut all, mut at, mut alternative) = (Vec::new(), 0, reading.slot.clone());
-        for word in words(received.bits()) {
-            let is_received = word == *received;
-            if !self.sensor.decodes(&word) {
-                continue;
-            }
-            alternative.observation = Observation::Received(word);
-            let likelihood = self.sensor.likelihood(&alternative, 1.0).ok();
-            let Some(own) = likelihood.and_then(|likelihood| parts.evidence(&*likelihood)) else {
-                continue;
-            };
-            let (log, correction) = place(&own);
-            if is_received {
-                at = all.len();
-            }
-            if log.is_finite() {
-                all.push((log, correction));
-            }
-        }
-        Residual::of_word(&all, at)
+        self.residual_of_word(reading.slot, received, |other| {
+            let likelihood = self.sensor.likelihood(other, 1.0).ok()?;
+            Some(place(&parts.evidence(&*likelihood)?)).filter(|(log, _)| log.is_finite())
+        })
     }
 
     /// Probability that a working sensor is silent, by points or a mixture.

@@ -21,13 +21,24 @@ impl<'a, const D: usize> OneIsWrong<'a, D> {
     }
 
     /// One hypothesis for each part, which is then wrong; of a single part also that it is right.
-    fn hypotheses(&self) -> impl Iterator<Item = Option<usize>> + '_ {
+    fn hypotheses(&self) -> impl Iterator<Item = Option<usize>> + Clone + '_ {
         let right = (self.parts.len() == 1).then_some(None);
         (0..self.parts.len()).map(Some).chain(right)
     }
 
     fn count(&self) -> f64 {
         self.parts.len().max(2) as f64
+    }
+
+    /// Log likelihood, from that of each part if it is right.
+    fn log_of(&self, right: impl Fn(usize) -> f64) -> f64 {
+        let parts = 0..self.parts.len();
+        if parts.clone().any(|k| right(k).is_nan()) {
+            return f64::NAN;
+        }
+        let log = |wrong: Option<usize>, k: usize| if wrong == Some(k) { self.parts[k].1 } else { right(k) };
+        let of = |wrong| parts.clone().map(|k| log(wrong, k)).sum::<f64>();
+        log_sum(self.hypotheses().map(of)) - self.count().ln()
     }
 }
 
@@ -44,17 +55,7 @@ pub(super) fn log_sum(terms: impl Iterator<Item = f64> + Clone) -> f64 {
 impl<const D: usize> Likelihood<D> for OneIsWrong<'_, D> {
     fn log_likelihood(&self, state: &SVector<f64, D>) -> f64 {
         let right: Vec<f64> = self.parts.iter().map(|(part, _)| part.log_likelihood(state)).collect();
-        if right.iter().any(|log| log.is_nan()) {
-            return f64::NAN;
-        }
-        let of = |wrong: Option<usize>| {
-            let terms = right.iter().zip(&self.parts).enumerate();
-            terms
-                .map(|(k, (right, part))| if wrong == Some(k) { part.1 } else { *right })
-                .sum::<f64>()
-        };
-        let terms: Vec<f64> = self.hypotheses().map(of).collect();
-        log_sum(terms.into_iter()) - self.count().ln()
+        self.log_of(|k| right[k])
     }
 
     fn add_log_likelihoods(&self, states: Columns<'_, D>, log_weights: &mut [f64]) {
@@ -67,17 +68,8 @@ impl<const D: usize> Likelihood<D> for OneIsWrong<'_, D> {
             logs
         };
         let right: Vec<Vec<f64>> = self.parts.iter().map(|(part, _)| sweep(*part)).collect();
-        let hypotheses: Vec<Option<usize>> = self.hypotheses().collect();
         for (i, log_weight) in log_weights.iter_mut().enumerate() {
-            let of = |wrong: &Option<usize>| {
-                let terms = right.iter().zip(&self.parts).enumerate();
-                terms
-                    .map(|(k, (right, part))| if *wrong == Some(k) { part.1 } else { right[i] })
-                    .sum::<f64>()
-            };
-            let is_number = right.iter().all(|logs| !logs[i].is_nan());
-            let log = log_sum(hypotheses.iter().map(of)) - self.count().ln();
-            *log_weight += if is_number { log } else { f64::NAN };
+            *log_weight += self.log_of(|k| right[k][i]);
         }
     }
 

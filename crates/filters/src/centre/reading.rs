@@ -9,7 +9,7 @@ use fewbits_core::{BitString, Evidence, Gaussian, Likelihood, Observation};
 use fewbits_numerics::normal::log_interval;
 
 /// Reports of at most this many bits are treated as words; the residual then sums over all possible words.
-pub(super) const WORD_BITS: usize = 4;
+const WORD_BITS: usize = 4;
 
 /// A slot of a sensor that has joined.
 pub(super) struct Reading<'a, const D: usize> {
@@ -46,6 +46,13 @@ pub(super) struct Tested {
 }
 
 impl Tested {
+    pub(crate) fn without_residual(is_possible: bool) -> Self {
+        Self {
+            is_possible,
+            residual: None,
+        }
+    }
+
     /// Probability of a report that is at most as likely.
     pub(crate) fn tail(&self) -> f64 {
         match self.residual {
@@ -126,7 +133,7 @@ pub(super) fn conditioned<const D: usize>(given: &Gaussian<D>, reports: &[&Readi
 }
 
 /// All words of at most [`WORD_BITS`] bits.
-pub(super) fn words(bits: usize) -> impl Iterator<Item = BitString> {
+fn words(bits: usize) -> impl Iterator<Item = BitString> {
     // A bit string begins at the highest bit of its first byte.
     (0..1_u8 << bits).filter_map(move |word| BitString::from_bytes(vec![word << (8 - bits)], bits).ok())
 }
@@ -170,14 +177,10 @@ impl<const D: usize> Member<D> {
         match evidence {
             Some(Ok(evidence)) => self.judged(reading, given, evidence),
             // An observation that cannot update a belief may still have a probability.
-            Some(Err(error)) => Tested {
-                is_possible: !matches!(error, Error::Impossible | Error::NotANumber { .. }),
-                residual: None,
-            },
-            None => Tested {
-                is_possible: false,
-                residual: None,
-            },
+            Some(Err(error)) => {
+                Tested::without_residual(!matches!(error, Error::Impossible | Error::NotANumber { .. }))
+            }
+            None => Tested::without_residual(false),
         }
     }
 
@@ -237,22 +240,31 @@ impl<const D: usize> Member<D> {
                 }
             };
         }
-        if bits.bits() == 0 || bits.bits() > WORD_BITS {
+        self.residual_of_word(slot, bits, |other| {
+            let is_received = other.observation == slot.observation;
+            let evidence = || self.evidence(other, predicted).ok().flatten();
+            if is_received { Some(received) } else { evidence() }.map(place)
+        })
+    }
+
+    /// The residual of a short word among all words that the sensor may send, each placed by its log likelihood and correction.
+    pub(super) fn residual_of_word(
+        &self,
+        slot: &Slot,
+        received: &BitString,
+        place: impl Fn(&Slot) -> Option<(f64, f64)>,
+    ) -> Option<Residual> {
+        if !(1..=WORD_BITS).contains(&received.bits()) {
             return None;
         }
-        let mut found = Vec::with_capacity(1 << bits.bits());
-        let (mut at, mut alternative) = (0, slot.clone());
-        for other in words(bits.bits()) {
-            if other == *bits {
+        let (mut found, mut at, mut other) = (Vec::with_capacity(1 << received.bits()), 0, slot.clone());
+        // Bits that are no word of the scheme, and words that it never sends, are left out.
+        for word in words(received.bits()).filter(|word| self.sensor.decodes(word)) {
+            if word == *received {
                 at = found.len();
-                found.push(place(received));
-                continue;
             }
-            // Bits that are no word of the scheme, and words that it never sends, are left out.
-            if self.sensor.decodes(&other) {
-                alternative.observation = Observation::Received(other);
-                found.extend(self.evidence(&alternative, predicted).ok().flatten().map(place));
-            }
+            other.observation = Observation::Received(word);
+            found.extend(place(&other));
         }
         Residual::of_word(&found, at)
     }

@@ -1,10 +1,12 @@
 //! The quadratic Gaussian CEO problem: a lower bound for separate sensors with limited rates.
 
 use super::{independent_variances, prior_variance};
-use crate::error::{Error, refuse};
+use crate::error::{Error, not_converged, refuse};
 use crate::observation_model::{Noise, Prior};
 use nalgebra::{DMatrix, DVector};
 
+/// Name of the algorithm in errors.
+const BARRIER: &str = "CEO barrier";
 /// Largest number of sensors: every subset of sensors is a constraint.
 const CEO_MAX_SENSORS: usize = 12;
 
@@ -58,11 +60,7 @@ pub fn ceo(prior: &Prior, noise: &Noise, bits: &[f64]) -> Result<CeoBound, Error
     if bound.gap <= MAX_GAP {
         Ok(bound)
     } else {
-        Err(Error::NotConverged {
-            algorithm: "CEO barrier",
-            iterations: 0,
-            change: bound.gap,
-        })
+        Err(not_converged(BARRIER, 0, bound.gap))
     }
 }
 
@@ -216,12 +214,8 @@ impl Ceo {
                 }
             }
         }
-        let stalled = Error::NotConverged {
-            algorithm: "CEO barrier",
-            iterations: 0,
-            change: 1.0 / weight,
-        };
-        let step = hessian.cholesky().ok_or(stalled)?.solve(&gradient);
+        let stalled = || not_converged(BARRIER, 0, 1.0 / weight);
+        let step = hessian.cholesky().ok_or_else(stalled)?.solve(&gradient);
         // The Newton decrement bounds the distance of the barrier function from its maximum.
         let decrement = step.dot(&gradient);
         Ok((step, decrement))

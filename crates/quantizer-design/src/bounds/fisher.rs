@@ -5,13 +5,13 @@ use crate::error::{Error, refuse};
 use crate::law::Active;
 use crate::system::System;
 
-/// Fisher information about `x` in the received symbols, at each value `x` of the model, for independent noise.
+/// Fisher information about `x` in the received symbols, averaged over the prior, for independent noise.
 ///
 /// `J(x) = sum_sensors sum_t (dP_t(x)/dx)^2 / P_t(x)`; symbols of probability zero are left out.
 ///
 /// # Errors
 /// [`Error::Argument`] if the noise is correlated.
-pub(crate) fn fisher_information(system: &System) -> Result<Vec<f64>, Error> {
+pub fn mean_fisher_information(system: &System) -> Result<f64, Error> {
     let model = system.model();
     if !model.is_independent() {
         return refuse("noise", "correlated noise", "independent noise for a Fisher information");
@@ -31,20 +31,7 @@ pub(crate) fn fisher_information(system: &System) -> Result<Vec<f64>, Error> {
             }
         }
     }
-    Ok(information)
-}
-
-/// Fisher information averaged over the prior.
-///
-/// # Errors
-/// [`Error::Argument`] if the noise is correlated.
-pub fn mean_fisher_information(system: &System) -> Result<f64, Error> {
-    let information = fisher_information(system)?;
-    Ok(information
-        .iter()
-        .zip(system.model().weights())
-        .map(|(j, w)| w * j)
-        .sum())
+    Ok(information.iter().zip(model.weights()).map(|(j, w)| w * j).sum())
 }
 
 /// `1 / (E J(X) + 1 / s_x^2)`: no estimator from these symbols has a smaller mean squared error (van Trees 1968). In squared units of `X`.

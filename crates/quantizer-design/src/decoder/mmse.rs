@@ -39,32 +39,26 @@ pub struct Estimate {
 /// # Ok::<(), fewbits_quantizer_design::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredDecoder", into = "StoredDecoder")]
+#[serde(try_from = "StoredDecoder")]
 pub struct MmseDecoder {
     system: System,
     limit: usize,
+    #[serde(skip_serializing)]
     layout: Layout,
     /// Probability, mean and variance of each outcome.
+    #[serde(skip_serializing)]
     entries: Vec<[f64; 3]>,
     /// Symbol probabilities at the nodes, for one sensor of each group.
+    #[serde(skip_serializing)]
     symbols: Vec<Table>,
 }
 
 /// The stored form of [`MmseDecoder`].
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StoredDecoder {
     system: System,
     limit: usize,
-}
-
-impl From<MmseDecoder> for StoredDecoder {
-    fn from(decoder: MmseDecoder) -> Self {
-        Self {
-            system: decoder.system,
-            limit: decoder.limit,
-        }
-    }
 }
 
 impl TryFrom<StoredDecoder> for MmseDecoder {

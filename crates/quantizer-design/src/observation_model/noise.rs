@@ -10,27 +10,19 @@ const COVARIANCE_TOLERANCE: f64 = 1e-10;
 
 /// Additive normal noise of all sensors: `a_n U + d_n V_n`, with a shared factor `U`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredNoise", into = "StoredNoise")]
+#[serde(try_from = "StoredNoise")]
 pub struct Noise {
     pub(super) loadings: Vec<f64>,
+    #[serde(rename = "residual_deviations")]
     pub(super) residuals: Vec<f64>,
 }
 
 /// The stored form of [`Noise`].
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StoredNoise {
     loadings: Vec<f64>,
     residual_deviations: Vec<f64>,
-}
-
-impl From<Noise> for StoredNoise {
-    fn from(noise: Noise) -> Self {
-        Self {
-            loadings: noise.loadings,
-            residual_deviations: noise.residuals,
-        }
-    }
 }
 
 impl TryFrom<StoredNoise> for Noise {

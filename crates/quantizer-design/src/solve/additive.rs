@@ -1,7 +1,7 @@
 //! A decoder that needs little memory: the estimate is a sum of one number per sensor.
 
 use super::solution::Solution;
-use crate::error::{Error, refuse};
+use crate::error::{Error, not_converged, refuse};
 use crate::law::symbol_tables;
 use crate::outcomes::{Table, dot, moments};
 use fewbits_numerics::error::entries;
@@ -79,12 +79,8 @@ impl Solution {
         // The matrix is singular (indicators of a sensor's symbols sum to one); the least solution of the normal equations is taken.
         let svd = gram.svd(true, true);
         let cut = RANK_TOLERANCE * svd.singular_values.max();
-        let stalled = Error::NotConverged {
-            algorithm: "additive decoder",
-            iterations: 0,
-            change: cut,
-        };
-        let weights = svd.solve(&moment, cut).map_err(|_| stalled)?;
+        let stalled = |_| not_converged("additive decoder", 0, cut);
+        let weights = svd.solve(&moment, cut).map_err(stalled)?;
         Ok(AdditiveDecoder {
             offset: model.mean,
             mean_squared_error: (model.variance - weights.dot(&moment)).max(0.0),

@@ -125,15 +125,7 @@ impl TryFrom<Stored> for Solution {
     type Error = Error;
 
     fn try_from(stored: Stored) -> Result<Self, Error> {
-        let Stored {
-            system,
-            sensors,
-            criterion,
-            value,
-            bound,
-            certificate,
-            scope,
-        } = stored;
+        let (system, sensors, value) = (stored.system, stored.sensors, stored.value);
         for sensor in &sensors {
             let (edges, bits) = (&sensor.breakpoints, sensor.bits);
             let increasing = edges.iter().all(|x| x.is_finite()) && edges.windows(2).all(|pair| pair[0] < pair[1]);
@@ -152,11 +144,11 @@ impl TryFrom<Stored> for Solution {
         Ok(Self {
             system,
             sensors,
-            criterion,
+            criterion: stored.criterion,
             value,
-            bound,
-            certificate,
-            scope,
+            bound: stored.bound,
+            certificate: stored.certificate,
+            scope: stored.scope,
         })
     }
 }
