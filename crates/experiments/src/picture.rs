@@ -42,12 +42,12 @@ impl<'a> Picture<'a> {
             named: *named,
             places: Vec::new(),
         };
-        let words = |row: &Vec<Value>| {
-            picture
-                .cells(Role::X, row)
-                .any(|(_, cell)| matches!(cell, Value::Text(_)))
+        // Words stand in their order, and so do the values of several columns together.
+        let named = |row: &Vec<Value>| {
+            let mut cells = picture.cells(Role::X, row);
+            matches!(cells.next(), Some((_, Value::Text(_)))) || cells.next().is_some()
         };
-        if table.rows.iter().any(words) {
+        if table.rows.iter().any(named) {
             picture.places = picture.values_of(Role::X, &table.rows);
         }
         picture
@@ -178,9 +178,8 @@ impl<'a> Picture<'a> {
             .get(i + 1)
             .filter(|next| next.name == format!("{}_se", columns[i].name));
         let mark = |row: &&[Value]| {
-            let (_, x) = self.cells(Role::X, row).next()?;
             let error = error.and_then(|_| number(&row[i + 1])).unwrap_or(0.0);
-            Some(((self.place(x)?, number(&row[i])?), error))
+            Some(((self.place(row)?, number(&row[i])?), error))
         };
         let (points, errors): (Vec<_>, Vec<_>) = rows.iter().filter_map(mark).unzip();
         let layers = match columns[i].role {
@@ -195,15 +194,13 @@ impl<'a> Picture<'a> {
         layers.into_iter().filter(|layer| !layer.is_empty()).collect()
     }
 
-    fn place(&self, x: &Value) -> Option<f64> {
-        match x {
-            Value::Text(text) => self
-                .places
-                .iter()
-                .position(|place| place == text)
-                .map(|place| place as f64),
-            other => number(other),
+    fn place(&self, row: &[Value]) -> Option<f64> {
+        if self.places.is_empty() {
+            return number(self.cells(Role::X, row).next()?.1);
         }
+        let own = self.value(Role::X, row);
+        let place = self.places.iter().position(|place| *place == own);
+        place.map(|place| place as f64)
     }
 }
 

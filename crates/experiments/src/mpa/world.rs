@@ -255,9 +255,14 @@ fn follow<B>(
     Ok(estimates)
 }
 
+/// The speed of the canonical scenario.
+pub(super) const SPEED: f64 = 3.0;
+
 /// Where a comparison is held.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Point {
+    /// What tables call it.
+    pub(super) name: String,
     pub(super) snr_db: f64,
     pub(super) levels: usize,
     pub(super) encoder: Encoder,
@@ -266,12 +271,13 @@ pub(super) struct Point {
 }
 
 impl Point {
-    /// The canonical sensors and the published encoder of the given speed.
-    pub(super) fn published(snr_db: f64, levels: usize, max_speed: f64) -> Result<Self, Error> {
+    /// The canonical sensors and the published encoder of the canonical speed, named after noise and levels.
+    pub(super) fn published(snr_db: f64, levels: usize) -> Result<Self, Error> {
         Ok(Self {
+            name: format!("{snr_db}dB-L{levels}"),
             snr_db,
             levels,
-            encoder: Encoder::published(max_speed)?,
+            encoder: Encoder::published(SPEED)?,
             sensors: canonical(),
             interval: IntervalRule::Correct,
         })
