@@ -67,10 +67,19 @@ pub(crate) fn written(
 
 /// The errata that a text cites, in words or by `claims.showing("mpa-1")`.
 pub(crate) fn cited(text: &str) -> impl Iterator<Item = &str> {
-    let in_words = text.split("rratum ").skip(1).map(|rest| rest.trim_start_matches([' ', '`']));
+    let in_words = text
+        .split("rratum ")
+        .skip(1)
+        .map(|rest| rest.trim_start_matches([' ', '`']));
     let by_name = text.split(".showing(\"").skip(1);
-    let id = |rest: &str| rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '-').unwrap_or(rest.len());
-    in_words.chain(by_name).map(move |rest| &rest[..id(rest)]).filter(|id| is_id(id))
+    let id = |rest: &str| {
+        rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '-')
+            .unwrap_or(rest.len())
+    };
+    in_words
+        .chain(by_name)
+        .map(move |rest| &rest[..id(rest)])
+        .filter(|id| is_id(id))
 }
 
 /// Adds the tests of a source file whose documentation cites errata: names by erratum.

@@ -8,12 +8,13 @@ use fewbits_plot::{Axis, Layer, Panel, Plot};
 pub type Named<'a> = (&'a str, &'a str, &'a dyn Fn(String, String) -> Panel);
 
 /// The first table that draws one of these panels: each of them for each value of its panel column (the figure's title without heading
-/// and value), a curve for each drawn column and each value of its key columns. Then the next table. Curves of one key have one colour;
-/// without keys each column has its own, but a line and the marks that are called the same up to a comma.
+/// and value), a curve for each drawn column and each value of its key columns. Then the next table, in the same panel where name and value
+/// are the same. Curves of one key have one colour; without keys each column has its own, but a line and the marks that are called the
+/// same up to a comma.
 pub fn plotted<T: Field>(tables: &T, title: &str, named: &[Named<'_>]) -> Plot {
     // A cell that is not finite is refused where the tables are written.
     let tables = Table::of(tables).unwrap_or_default();
-    let mut panels = Vec::new();
+    let mut panels: Vec<(&str, String, Panel)> = Vec::new();
     for table in &tables {
         let pictures = named.iter().map(|named| Picture::of(table, named));
         let pictures: Vec<Picture<'_>> = pictures.filter(Picture::is_drawn).collect();
@@ -21,10 +22,19 @@ pub fn plotted<T: Field>(tables: &T, title: &str, named: &[Named<'_>]) -> Plot {
             .first()
             .map_or_else(Vec::new, |first| first.values_of(Role::Panel, &table.rows))
         {
-            panels.extend(pictures.iter().map(|picture| picture.panel(title, &value)));
+            for picture in &pictures {
+                let name = picture.named.0;
+                let known = panels
+                    .iter_mut()
+                    .find(|(own, of, _)| !own.is_empty() && *own == name && *of == value);
+                match known {
+                    Some((.., panel)) => picture.draw(panel, &value),
+                    None => panels.push((name, value.clone(), picture.panel(title, &value))),
+                }
+            }
         }
     }
-    Plot::grid(2, panels)
+    Plot::grid(2, panels.into_iter().map(|(.., panel)| panel).collect())
 }
 
 /// A table, the panel of it that is drawn, and the places of its words on the horizontal axis.
@@ -73,11 +83,6 @@ impl<'a> Picture<'a> {
 
     /// The panel of one value of the panel columns.
     fn panel(&self, title: &str, value: &str) -> Panel {
-        let rows = self
-            .table
-            .rows
-            .iter()
-            .filter(|row| self.value(Role::Panel, row) == *value);
         let (_, heading, panel) = self.named;
         let words: Vec<&str> = [heading, value].into_iter().filter(|word| !word.is_empty()).collect();
         let title = match (words.as_slice(), self.named.0) {
@@ -88,7 +93,21 @@ impl<'a> Picture<'a> {
         if !self.places.is_empty() {
             panel.x = Axis::categories(panel.x.label, &self.places);
         }
-        panel.with_all(self.layers(&rows.collect::<Vec<_>>()))
+        self.draw(&mut panel, value);
+        panel
+    }
+
+    /// Draws the rows of one value of the panel columns over what a panel has, in other colours.
+    fn draw(&self, panel: &mut Panel, value: &str) {
+        let rows = self.table.rows.iter();
+        let rows: Vec<_> = rows.filter(|row| self.value(Role::Panel, row) == *value).collect();
+        let colours = panel.layers.iter().filter_map(|layer| layer.colour);
+        let first = colours.max().map_or(0, |last| last + 1);
+        let layers = self.layers(&rows).into_iter();
+        panel.layers.extend(layers.map(|layer| {
+            let own = first + layer.colour.unwrap_or(0);
+            layer.coloured(own)
+        }));
     }
 
     /// The columns of this role and a row's cells in them.
@@ -285,6 +304,46 @@ mod tests {
             ("a = 0.5, q = 2", vec!["rate", "bound", "sensor 1", "sensor 2"]),
         ];
         assert_eq!(said.collect::<Vec<_>>(), expected);
+    }
+
+    rows! {
+        struct Curves {
+            errors: Vec<Both> => "Errors.",
+            levels: Vec<Level> => "Levels.",
+        }
+
+        struct Level {
+            a: f64 as panel("a = {}, q = 2") => "Coefficient.",
+            time: f64 as x("time") => "Time.",
+            level: f64 as dashed("level") in errors => "Level.",
+        }
+    }
+
+    #[test]
+    fn tables_meet_in_the_panel_of_one_name_and_value() {
+        let plant = Plant { a: 0.5, q: 2.0 };
+        let errors = [1.0, 2.0].map(|time| Both {
+            plant,
+            time,
+            rate: 1.0,
+            error: 2.0,
+            bound: 3.0,
+            each: [4.0, 5.0],
+        });
+        let levels = [0.5, 0.7].map(|a| Level {
+            a,
+            time: 1.0,
+            level: 1.0,
+        });
+        let (errors, levels) = (errors.into(), levels.into());
+        let axes = |title, x| Panel::semilog(title, x, "error");
+        let plot = plotted(&Curves { errors, levels }, "title", &[("errors", "", &axes)]);
+        let said = plot.panels.iter().map(|panel| {
+            let layers = panel.layers.iter().map(|layer| (layer.label.as_str(), layer.colour));
+            (panel.title.as_str(), layers.collect::<Vec<_>>())
+        });
+        let both = vec![("error", Some(0)), ("bound", Some(1)), ("level", Some(2))];
+        assert_eq!(said.collect::<Vec<_>>(), [("a = 0.5, q = 2", both), ("a = 0.7, q = 2", vec![("level", Some(0))])]);
     }
 
     fn rows(worlds: &[&'static str], schemes: &[&'static str]) -> Vec<Row> {

@@ -1,7 +1,7 @@
 //! `mpa-table3-mse`, `mpa-fig3-4`, `mpa-fig3-5`, `mpa-table3-low`: all trackers over particles, levels and noise.
 
 use super::scores::{Effort, GAUSSIAN, MSE, Row, clouds, deterministic, ladder, messages, mse, rows};
-use super::world::{LAYOUTS, Method, Point};
+use super::world::{Method, Point, layouts};
 use crate::prelude::*;
 use fewbits_baselines::pf_mpa::{Encoder, Reports};
 
@@ -32,7 +32,7 @@ impl Figure for Mse {
         let canonical = Point::published(50.0, 4)?;
         let trackers = rows(context, &canonical, &p.of(&methods))?;
         let cheap = p.of(&[&GAUSSIAN[..], &[Method::Guided(40)]].concat());
-        let (mut speeds, mut layouts, mut floor) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut speeds, mut others, mut floor) = (Vec::new(), Vec::new(), Vec::new());
         for speed in [1.0, 1.5, 2.0, 3.0, 4.0] {
             let mut point = canonical.clone();
             (point.name, point.encoder) = (format!("V{speed}"), Encoder::published(speed)?);
@@ -47,10 +47,10 @@ impl Figure for Mse {
             trials: p.trials.min(100),
             message_trials: p.message_trials.min(25),
         };
-        for (i, sensors) in LAYOUTS.iter().enumerate() {
+        for (i, sensors) in layouts()?.into_iter().enumerate() {
             let mut point = canonical.clone();
-            (point.name, point.sensors) = (format!("layout{i}"), sensors.map(Vector2::from).to_vec());
-            layouts.extend(rows(context, &point, &effort.of(&some))?);
+            (point.name, point.sensors) = (format!("layout{i}"), sensors);
+            others.extend(rows(context, &point, &effort.of(&some))?);
         }
         let large = [
             Method::Bootstrap(4000, Reports::Levels),
@@ -64,7 +64,7 @@ impl Figure for Mse {
         Ok(Mses {
             trackers,
             speeds,
-            layouts,
+            layouts: others,
             floor,
         })
     }
