@@ -153,7 +153,7 @@ impl Figure for Fig6c {
     figure!(Parameters => Rows, "handoff-fig6c", "The actual error", "compressed particle filter, Section 6, Figure 6(c)",
         "KL from a reference filter of 2000 particles, less that to an independent copy of it, in 150 worlds. The three criteria are \
          close, ML a little behind; all are far below their bounds, and a single Gaussian is far behind.";
-        { error: linear("KL increase / nat") });
+        { error: linear("KL increase / nat", "Five components") });
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let runs = context.trials(context.stream("handoff-fig6c"), p.trials, |it| trial(p, it))?;
