@@ -5,7 +5,7 @@
 /// Limits are `[low..=high]`, either end may be missing; of a list `[low..=high; least..=most]`, first of its entries, then of its
 /// length. The meaning is the field's documentation; one that is longer than a line may stand above the field instead. What speaks
 /// of several fields is a function behind the struct: `check |p| accept("low", p.low < p.high, || ...);`, before it `cost |p| Cost::new(seconds, bytes);`
-/// where a setting could ask for too much. A struct `point struct` is an entry of a list or the
+/// where a setting could ask for too much, and behind it `quicken |p| p.size = p.size.min(9);` where `--quick` depends on the setting. A struct `point struct` is an entry of a list or the
 /// settings of several figures: it has no defaults, and its fields may be columns of a row.
 ///
 /// ```
@@ -29,6 +29,7 @@ macro_rules! parameters {
         }
         $(cost $cost:expr;)?
         $(check $check:expr;)?
+        $(quicken $quicken:expr;)?
     ) => {
         $crate::parameters! {
             $(#[$outer])*
@@ -46,6 +47,8 @@ macro_rules! parameters {
         impl $crate::Quick for $name {
             fn quicken(&mut self) {
                 $($(self.$field = $quick;)?)*
+                $(let further: fn(&mut Self) = $quicken;
+                further(self);)?
             }
 
             $(fn cost(&self) -> $crate::Cost {
@@ -110,7 +113,7 @@ macro_rules! limits {
 /// them, without a word in the claims; behind `by "{distance} m" at full_trials` no plain averages are, with fewer trials undecided.
 ///
 /// What a field is in the default plot stands behind its type and unit, with what it is called there: `as panel("ratio {}")`,
-/// `as x("time t")`, `as key`, `as line("exact")`, `as dashed("bound")`, `as points("simulated")`, `as curve("mean")`. Where there
+/// `as x("time t")` (several such columns stand together as words), `as key`, `as line("exact")`, `as dashed("bound")`, `as points("simulated")`, `as curve("mean")`. Where there
 /// are several panels of one horizontal axis, `as line("exact") in errors` names those of the column. A row within a row has one
 /// role, and a `{}` for each of its columns. [`figure!`](crate::figure!) then draws the rows.
 ///
@@ -143,7 +146,7 @@ macro_rules! rows {
                 let first = to.described();
                 $(<$type as $crate::schema::Field>::describe(
                     $crate::Column::of(stringify!($field), concat!("" $(, $unit)?), $meaning)
-                        $(.drawn($crate::role!($role), concat!("" $(, $label)?), &[$(stringify!($panel)),*]))?,
+                        $(.drawn($crate::schema::roles::$role, concat!("" $(, $label)?), &[$(stringify!($panel)),*]))?,
                     to,
                 );)*
                 to.draw(first, row);
@@ -159,7 +162,7 @@ macro_rules! rows {
             }
 
             $(fn at_full_trials() -> bool {
-                $crate::effort!($effort)
+                $crate::schema::efforts::$effort
             })?)?
         }
     };
@@ -200,42 +203,6 @@ macro_rules! rows {
     )*};
 }
 
-/// Which trial counts the references of a row need, as [`rows!`](crate::rows!) writes it.
-#[macro_export]
-#[doc(hidden)]
-macro_rules! effort {
-    (full_trials) => {
-        true
-    };
-}
-
-/// The [`Role`](crate::schema::Role) of a column as [`rows!`](crate::rows!) writes it.
-#[macro_export]
-#[doc(hidden)]
-macro_rules! role {
-    (panel) => {
-        $crate::schema::Role::Panel
-    };
-    (x) => {
-        $crate::schema::Role::X
-    };
-    (key) => {
-        $crate::schema::Role::Key
-    };
-    (line) => {
-        $crate::schema::Role::Line
-    };
-    (dashed) => {
-        $crate::schema::Role::Dashed
-    };
-    (points) => {
-        $crate::schema::Role::Points
-    };
-    (curve) => {
-        $crate::schema::Role::Curve
-    };
-}
-
 /// What stands at the head of a [`Figure`](crate::Figure): its parameters and tables, its id, its title, where in the
 /// publications it comes from, and its caption.
 ///
@@ -249,46 +216,42 @@ macro_rules! role {
 /// behind it as well.
 #[macro_export]
 macro_rules! figure {
-    ($parameters:ty => $tables:ty, $id:expr, $title:literal, $source:literal, $caption:literal; $panel:ident($y:expr)) => {
-        $crate::figure!($parameters => $tables, $id, $title, $source, $caption);
-
-        fn plot(&self, _: &Self::Parameters, tables: &Self::Tables) -> $crate::plot::Plot {
-            $crate::plotted(tables, $title, &[("", "", &|title, x| $crate::plot::Panel::$panel(title, x, $y))])
-        }
-    };
-    ($parameters:ty => $tables:ty, $id:expr, $title:literal, $source:literal, $caption:literal;
-        { $($name:ident: $panel:ident($y:expr $(, $heading:literal)?)),+ $(,)? }) => {
-        $crate::figure!($parameters => $tables, $id, $title, $source, $caption);
-
-        fn plot(&self, _: &Self::Parameters, tables: &Self::Tables) -> $crate::plot::Plot {
-            $crate::plotted(tables, $title, &[$((
-                stringify!($name),
-                concat!("" $(, $heading)?),
-                &|title, x| $crate::plot::Panel::$panel(title, x, $y),
-            )),+])
-        }
-    };
-    ($parameters:ty => $tables:ty, $id:expr, $title:literal, $source:literal, $caption:literal) => {
+    ($parameters:ty => $tables:ty, $id:expr, $title:literal, $source:literal, $caption:literal $(; $($panels:tt)+)?) => {
         type Parameters = $parameters;
         type Tables = $tables;
 
         fn about(&self) -> $crate::About {
             $crate::About::of($id, $title, $source).showing($caption)
         }
-    };
-    ($parameters:ty => $tables:ty, $about:ident; $panel:ident($y:expr)) => {
-        $crate::figure!($parameters => $tables, $about);
 
-        fn plot(&self, _: &Self::Parameters, tables: &Self::Tables) -> $crate::plot::Plot {
-            $crate::plotted(tables, self.$about.title, &[("", "", &|title, x| $crate::plot::Panel::$panel(title, x, $y))])
-        }
+        $($crate::drawn! { $($panels)+ })?
     };
-    ($parameters:ty => $tables:ty, $about:ident) => {
+    ($parameters:ty => $tables:ty, $about:ident $(; $($panels:tt)+)?) => {
         type Parameters = $parameters;
         type Tables = $tables;
 
         fn about(&self) -> $crate::About {
             self.$about
+        }
+
+        $($crate::drawn! { $($panels)+ })?
+    };
+}
+
+/// The default plot as [`figure!`](crate::figure!) writes its panels.
+#[macro_export]
+#[doc(hidden)]
+macro_rules! drawn {
+    ($panel:ident($y:expr)) => {
+        $crate::drawn! { @panels "", "" => $panel($y) }
+    };
+    ({ $($name:ident: $panel:ident($y:expr $(, $heading:literal)?)),+ $(,)? }) => {
+        $crate::drawn! { @panels $(stringify!($name), concat!("" $(, $heading)?) => $panel($y)),+ }
+    };
+    (@panels $($name:expr, $heading:expr => $panel:ident($y:expr)),+) => {
+        fn plot(&self, _: &Self::Parameters, tables: &Self::Tables) -> $crate::plot::Plot {
+            let title = $crate::Figure::about(self).title;
+            $crate::plotted(tables, title, &[$(($name, $heading, &|title, x| $crate::plot::Panel::$panel(title, x, $y))),+])
         }
     };
 }

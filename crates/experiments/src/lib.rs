@@ -53,9 +53,6 @@ pub use measured::Measured;
 pub use picture::plotted;
 pub use schema::{Column, Table, Value};
 
-/// The features with which this crate was built: results may depend on them.
-pub const FEATURES: &[&str] = if cfg!(feature = "zstd") { &["zstd"] } else { &[] };
-
 /// Every figure and table, in the order of the publications.
 pub fn all() -> Vec<&'static dyn AnyFigure> {
     vec![

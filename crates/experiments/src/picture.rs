@@ -8,12 +8,13 @@ use fewbits_plot::{Axis, Layer, Panel, Plot};
 pub type Named<'a> = (&'a str, &'a str, &'a dyn Fn(String, String) -> Panel);
 
 /// The first table that draws one of these panels: each of them for each value of its panel column (the figure's title without heading
-/// and value), a curve for each drawn column and each value of its key columns. Then the next table. Curves of one key have one colour;
-/// without keys each column has its own, but a line and the marks that are called the same up to a comma.
+/// and value), a curve for each drawn column and each value of its key columns. Then the next table, in the same panel where name and value
+/// are the same. Curves of one key have one colour; without keys each column has its own, but a line and the marks that are called the
+/// same up to a comma.
 pub fn plotted<T: Field>(tables: &T, title: &str, named: &[Named<'_>]) -> Plot {
     // A cell that is not finite is refused where the tables are written.
     let tables = Table::of(tables).unwrap_or_default();
-    let mut panels = Vec::new();
+    let mut panels: Vec<(&str, String, Panel)> = Vec::new();
     for table in &tables {
         let pictures = named.iter().map(|named| Picture::of(table, named));
         let pictures: Vec<Picture<'_>> = pictures.filter(Picture::is_drawn).collect();
@@ -21,10 +22,19 @@ pub fn plotted<T: Field>(tables: &T, title: &str, named: &[Named<'_>]) -> Plot {
             .first()
             .map_or_else(Vec::new, |first| first.values_of(Role::Panel, &table.rows))
         {
-            panels.extend(pictures.iter().map(|picture| picture.panel(title, &value)));
+            for picture in &pictures {
+                let name = picture.named.0;
+                let known = panels
+                    .iter_mut()
+                    .find(|(own, of, _)| !own.is_empty() && *own == name && *of == value);
+                match known {
+                    Some((.., panel)) => picture.draw(panel, &value),
+                    None => panels.push((name, value.clone(), picture.panel(title, &value))),
+                }
+            }
         }
     }
-    Plot::grid(2, panels)
+    Plot::grid(2, panels.into_iter().map(|(.., panel)| panel).collect())
 }
 
 /// A table, the panel of it that is drawn, and the places of its words on the horizontal axis.
@@ -42,12 +52,12 @@ impl<'a> Picture<'a> {
             named: *named,
             places: Vec::new(),
         };
-        let words = |row: &Vec<Value>| {
-            picture
-                .cells(Role::X, row)
-                .any(|(_, cell)| matches!(cell, Value::Text(_)))
+        // Words stand in their order, and so do the values of several columns together.
+        let named = |row: &Vec<Value>| {
+            let mut cells = picture.cells(Role::X, row);
+            matches!(cells.next(), Some((_, Value::Text(_)))) || cells.next().is_some()
         };
-        if table.rows.iter().any(words) {
+        if table.rows.iter().any(named) {
             picture.places = picture.values_of(Role::X, &table.rows);
         }
         picture
@@ -73,11 +83,6 @@ impl<'a> Picture<'a> {
 
     /// The panel of one value of the panel columns.
     fn panel(&self, title: &str, value: &str) -> Panel {
-        let rows = self
-            .table
-            .rows
-            .iter()
-            .filter(|row| self.value(Role::Panel, row) == *value);
         let (_, heading, panel) = self.named;
         let words: Vec<&str> = [heading, value].into_iter().filter(|word| !word.is_empty()).collect();
         let title = match (words.as_slice(), self.named.0) {
@@ -88,7 +93,21 @@ impl<'a> Picture<'a> {
         if !self.places.is_empty() {
             panel.x = Axis::categories(panel.x.label, &self.places);
         }
-        panel.with_all(self.layers(&rows.collect::<Vec<_>>()))
+        self.draw(&mut panel, value);
+        panel
+    }
+
+    /// Draws the rows of one value of the panel columns over what a panel has, in other colours.
+    fn draw(&self, panel: &mut Panel, value: &str) {
+        let rows = self.table.rows.iter();
+        let rows: Vec<_> = rows.filter(|row| self.value(Role::Panel, row) == *value).collect();
+        let colours = panel.layers.iter().filter_map(|layer| layer.colour);
+        let first = colours.max().map_or(0, |last| last + 1);
+        let layers = self.layers(&rows).into_iter();
+        panel.layers.extend(layers.map(|layer| {
+            let own = first + layer.colour.unwrap_or(0);
+            layer.coloured(own)
+        }));
     }
 
     /// The columns of this role and a row's cells in them.
@@ -178,9 +197,8 @@ impl<'a> Picture<'a> {
             .get(i + 1)
             .filter(|next| next.name == format!("{}_se", columns[i].name));
         let mark = |row: &&[Value]| {
-            let (_, x) = self.cells(Role::X, row).next()?;
             let error = error.and_then(|_| number(&row[i + 1])).unwrap_or(0.0);
-            Some(((self.place(x)?, number(&row[i])?), error))
+            Some(((self.place(row)?, number(&row[i])?), error))
         };
         let (points, errors): (Vec<_>, Vec<_>) = rows.iter().filter_map(mark).unzip();
         let layers = match columns[i].role {
@@ -195,15 +213,13 @@ impl<'a> Picture<'a> {
         layers.into_iter().filter(|layer| !layer.is_empty()).collect()
     }
 
-    fn place(&self, x: &Value) -> Option<f64> {
-        match x {
-            Value::Text(text) => self
-                .places
-                .iter()
-                .position(|place| place == text)
-                .map(|place| place as f64),
-            other => number(other),
+    fn place(&self, row: &[Value]) -> Option<f64> {
+        if self.places.is_empty() {
+            return number(self.cells(Role::X, row).next()?.1);
         }
+        let own = self.value(Role::X, row);
+        let place = self.places.iter().position(|place| *place == own);
+        place.map(|place| place as f64)
     }
 }
 
@@ -226,129 +242,4 @@ fn number(value: &Value) -> Option<f64> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::Measured;
-    use fewbits_plot::Shape;
-
-    rows! {
-        struct Row {
-            world: &'static str as panel("world {}") => "World.",
-            scheme: &'static str as key => "Scheme.",
-            time: f64 ["s"] as x => "Time.",
-            error: Measured ["m"] as points("simulated") => "Error.",
-            bound: Option<f64> ["m"] as dashed => "Bound.",
-            trials: u64 => "Trials.",
-        }
-
-        struct Named {
-            method: &'static str as x("") => "How.",
-            cost: f64 as points => "Cost.",
-        }
-    }
-
-    parameters! {
-        #[derive(Clone, Copy)]
-        point struct Plant {
-            a: f64 => "Coefficient.",
-            q: f64 => "Variance.",
-        }
-    }
-
-    rows! {
-        struct Both {
-            plant: Plant as panel("a = {}, q = {}"),
-            time: f64 as x("time") => "Time.",
-            rate: f64 as line("rate") in rates => "Rate.",
-            error: f64 as points("error") in errors => "Error.",
-            bound: f64 as dashed("bound") in errors rates => "Bound.",
-            each: [f64; 2] as line("sensor {}") in rates => "Of each.",
-        }
-    }
-
-    #[test]
-    fn columns_name_their_panels_and_a_row_within_has_one_role() {
-        let row = |time: f64| Both {
-            plant: Plant { a: 0.5, q: 2.0 },
-            time,
-            rate: 1.0,
-            error: 2.0,
-            bound: 3.0,
-            each: [4.0, 5.0],
-        };
-        let rates = |title, x| Panel::linear(title, x, "rate");
-        let errors = |title, x| Panel::semilog(title, x, "error");
-        let plot = plotted(&vec![row(1.0), row(2.0)], "title", &[("errors", "Errors", &errors), ("rates", "", &rates)]);
-        let said = plot.panels.iter().map(|panel| {
-            let labels = panel.layers.iter().map(|layer| layer.label.as_str());
-            (panel.title.as_str(), labels.collect::<Vec<_>>())
-        });
-        let expected = [
-            ("Errors, a = 0.5, q = 2", vec!["error", "bound"]),
-            ("a = 0.5, q = 2", vec!["rate", "bound", "sensor 1", "sensor 2"]),
-        ];
-        assert_eq!(said.collect::<Vec<_>>(), expected);
-    }
-
-    fn rows(worlds: &[&'static str], schemes: &[&'static str]) -> Vec<Row> {
-        let mut rows = Vec::new();
-        for &world in worlds {
-            for &scheme in schemes {
-                for time in [1.0, 2.0] {
-                    let bound = (scheme == "a").then_some(0.5);
-                    rows.push(Row {
-                        world,
-                        scheme,
-                        time,
-                        error: Measured::new(1.0, 0.25),
-                        bound,
-                        trials: 9,
-                    });
-                }
-            }
-        }
-        rows
-    }
-
-    #[test]
-    fn roles_say_panels_curves_and_axes() {
-        let plot = plotted(
-            &rows(&["one", "two"], &["a", "b"]),
-            "title",
-            &[("", "", &|title, x| Panel::semilog(title, x, "error / m"))],
-        );
-        let titles: Vec<&str> = plot.panels.iter().map(|panel| panel.title.as_str()).collect();
-        assert_eq!(titles, ["world one", "world two"]);
-        assert_eq!(plot.panels[0].x.label, "Time / s");
-        let layers = &plot.panels[1].layers;
-        let said: Vec<_> = layers
-            .iter()
-            .map(|layer| (layer.label.as_str(), layer.colour))
-            .collect();
-        assert_eq!(
-            said,
-            [
-                ("simulated, a", Some(0)),
-                ("Bound / m, a", Some(0)),
-                ("simulated, b", Some(1))
-            ]
-        );
-        let Shape::Points { points, errors, .. } = &layers[0].shape else {
-            panic!("{layers:?}")
-        };
-        assert_eq!((points, errors), (&vec![(1.0, 1.0), (2.0, 1.0)], &vec![0.25, 0.25]));
-        assert!(matches!(&layers[1].shape, Shape::Line { points, .. } if *points == [(1.0, 0.5), (2.0, 0.5)]));
-    }
-
-    #[test]
-    fn without_keys_each_column_has_its_colour_and_words_are_places() {
-        let rows = vec![Named { method: "x", cost: 1.0 }, Named { method: "y", cost: 2.0 }];
-        let plot = plotted(&rows, "Costs", &[("", "", &|title, x| Panel::linear(title, x, ""))]);
-        assert_eq!(plot.panels[0].title, "Costs");
-        let names: Vec<&str> = plot.panels[0].x.names.iter().map(|(_, name)| name.as_str()).collect();
-        assert_eq!(names, ["x", "y"]);
-        let layers = &plot.panels[0].layers;
-        assert!(matches!(&layers[0].shape, Shape::Points { points, .. } if *points == [(0.0, 1.0), (1.0, 2.0)]));
-        assert_eq!((layers.len(), layers[0].label.as_str()), (1, "Cost"));
-    }
-}
+mod tests;

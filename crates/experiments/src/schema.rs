@@ -51,6 +51,27 @@ pub enum Role {
     Curve,
 }
 
+/// Roles as [`rows!`](crate::rows!) names them.
+#[doc(hidden)]
+#[allow(non_upper_case_globals, reason = "words of a macro")]
+pub mod roles {
+    use super::Role;
+    pub const panel: Role = Role::Panel;
+    pub const x: Role = Role::X;
+    pub const key: Role = Role::Key;
+    pub const line: Role = Role::Line;
+    pub const dashed: Role = Role::Dashed;
+    pub const points: Role = Role::Points;
+    pub const curve: Role = Role::Curve;
+}
+
+/// Which trial counts the references of a row need, as [`rows!`](crate::rows!) names them.
+#[doc(hidden)]
+#[allow(non_upper_case_globals, reason = "words of a macro")]
+pub mod efforts {
+    pub const full_trials: bool = true;
+}
+
 impl Column {
     /// A column of this name, unit and documentation.
     pub fn of(name: &str, unit: &'static str, documentation: &str) -> Self {

@@ -1,7 +1,8 @@
 //! `--list` and `describe`: what figures there are, and what one takes and gives.
 
-use super::times::{expected_seconds, in_words};
+use super::times::expected_seconds;
 use fewbits_experiments::{AnyFigure, Column};
+use indicatif::HumanDuration;
 use std::fmt::Write;
 use std::time::Duration;
 
@@ -10,8 +11,8 @@ pub(super) fn list(figures: &[&'static dyn AnyFigure], quick: bool) -> String {
     let width = figures.iter().map(|f| f.about().id.len()).max().unwrap_or(0);
     let line = |f: &&dyn AnyFigure| {
         let seconds = expected_seconds(f.about().id, quick);
-        let time = in_words(Duration::from_secs_f64(seconds));
-        format!("{:width$}  {time:>7}  {}\n", f.about().id, f.about().title)
+        let time = HumanDuration(Duration::from_secs_f64(seconds)).to_string();
+        format!("{:width$}  {time:>10}  {}\n", f.about().id, f.about().title)
     };
     figures.iter().map(line).collect()
 }

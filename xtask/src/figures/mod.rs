@@ -2,8 +2,6 @@
 
 mod describe;
 mod gallery;
-#[cfg(test)]
-mod gate;
 mod options;
 mod produce;
 mod progress;
@@ -13,9 +11,9 @@ mod record;
 mod reuse;
 mod run;
 mod select;
-#[cfg(test)]
-mod sources;
 mod summary;
+#[cfg(test)]
+mod tests;
 mod times;
 mod write;
 
@@ -134,7 +132,7 @@ fn errata(from: &Path, check: bool) -> Result<Ending, Error> {
                 .claims
                 .iter()
                 .any(|c| errata::cited(&c.statement).any(|cited| cited == row.id)),
-            None => row.figures_and_tests().0.contains(**id),
+            None => row.names(id),
         };
         ids.iter().filter(shows).copied().collect()
     });

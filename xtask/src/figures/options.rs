@@ -30,7 +30,7 @@ pub struct Options {
     /// Directory for the output, made if missing; relative to the workspace.
     #[arg(long, default_value = "target/figures")]
     pub out: PathBuf,
-    /// Make all chosen figures anew, also those whose parameters and sources are unchanged since they were made.
+    /// Make all chosen figures anew, also those whose parameters and program are unchanged since they were made.
     #[arg(long)]
     pub force: bool,
     /// Write no SVG.

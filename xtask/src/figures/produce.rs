@@ -10,7 +10,6 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
-use thiserror::Error as ThisError;
 
 /// Set by Ctrl-C.
 pub(super) static STOP: AtomicBool = AtomicBool::new(false);
@@ -57,33 +56,21 @@ impl<'a> Maker<'a> {
         // A user's file may change: its figure is made again.
         let fingerprint = reuse::fingerprint(job, self.options.seed).filter(|_| !has_read.load(Ordering::Relaxed));
         let record = Record::new(about, &job.run.parameters, began.elapsed(), self.options, fingerprint);
-        match result {
-            Ok(outcome) => Some(Made::of(record, &outcome, !self.options.no_plots)),
-            Err(Failure::Cancelled) => None,
-            Err(failure) => Some(Made::failed(record, &failure)),
-        }
+        Some(match result? {
+            Ok(outcome) => Made::of(record, &outcome, !self.options.no_plots),
+            Err(reason) => Made::failed(record, &reason),
+        })
     }
 }
 
-/// Why a figure has no outcome.
-#[derive(Debug, ThisError)]
-enum Failure {
-    #[error("stopped")]
-    Cancelled,
-    #[error("{0}")]
-    Refused(fewbits_experiments::Error),
-    #[error("panicked (please report this): {0}")]
-    Panicked(String),
-}
-
-/// Runs one figure; a panic in it is its own failure and nobody else's.
-fn produce(pool: &rayon::ThreadPool, job: &Job, context: &Context<'_>) -> Result<Outcome, Failure> {
+/// Runs one figure: its outcome, or why it has none; nothing if the user stopped it. A panic is its own failure and nobody else's.
+fn produce(pool: &rayon::ThreadPool, job: &Job, context: &Context<'_>) -> Option<Result<Outcome, String>> {
     let run = || pool.install(|| job.run.outcome(context));
     match catch_unwind(AssertUnwindSafe(run)) {
-        Ok(Ok(outcome)) => Ok(outcome),
-        Ok(Err(fewbits_experiments::Error::Cancelled)) => Err(Failure::Cancelled),
-        Ok(Err(error)) => Err(Failure::Refused(error)),
-        Err(payload) => Err(Failure::Panicked(message(payload.as_ref()))),
+        Ok(Ok(outcome)) => Some(Ok(outcome)),
+        Ok(Err(fewbits_experiments::Error::Cancelled)) => None,
+        Ok(Err(error)) => Some(Err(error.to_string())),
+        Err(payload) => Some(Err(format!("panicked (please report this): {}", message(payload.as_ref())))),
     }
 }
 
@@ -172,7 +159,7 @@ mod tests {
             figure: &Panics,
             run: Panics.with(Map::new()).unwrap(),
         };
-        let failure = produce(&pool, &job, &Context::new(1)).unwrap_err();
-        assert!(failure.to_string().contains("as a figure might"));
+        let failure = produce(&pool, &job, &Context::new(1)).unwrap().unwrap_err();
+        assert!(failure.contains("as a figure might"));
     }
 }

@@ -1,9 +1,8 @@
 //! Progress: bars on a terminal, a line for each finished figure elsewhere.
 
 use super::record::Record;
-use super::times::in_words;
 use fewbits_experiments::Verdict;
-use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -74,7 +73,7 @@ impl Progress {
             String::new()
         };
         if figures > 0 {
-            let time = in_words(Duration::from_secs_f64(expected));
+            let time = HumanDuration(Duration::from_secs_f64(expected));
             progress.say(&format!("{kept}{figures} figures to make on {threads} threads, about {time}, longest first"));
         } else if reused > 0 {
             progress.say(kept.trim_end_matches("; "));
@@ -128,7 +127,7 @@ impl Progress {
         let running: Vec<_> = state
             .running
             .iter()
-            .map(|(id, since)| format!("{id} ({})", in_words(since.elapsed())))
+            .map(|(id, since)| format!("{id} ({})", HumanDuration(since.elapsed())))
             .collect();
         eprintln!("      running: {}", running.join(", "));
     }
@@ -161,10 +160,10 @@ impl Running<'_> {
             line.finish_and_clear();
             bars.figures.inc(1);
             bars.figures
-                .set_message(left.map_or_else(String::new, |left| format!(", about {} left", in_words(left))));
+                .set_message(left.map_or_else(String::new, |left| format!(", about {} left", HumanDuration(left))));
         }
         if let (Some(record), None) = (record, &progress.bars) {
-            let left = left.map_or_else(String::new, |left| format!("  ({} left)", in_words(left)));
+            let left = left.map_or_else(String::new, |left| format!("  ({} left)", HumanDuration(left)));
             let width = progress.figures.to_string().len();
             eprintln!("[{:>width$}/{}] {}{left}", state.finished, progress.figures, outcome(record));
         }
@@ -173,7 +172,7 @@ impl Running<'_> {
 
 /// Id, claims and time of a finished figure.
 fn outcome(record: &Record) -> String {
-    let time = in_words(Duration::from_secs_f64(record.wall_time_s));
+    let time = HumanDuration(Duration::from_secs_f64(record.wall_time_s));
     let claims = match (&record.error, record.count(Verdict::Fail)) {
         (Some(error), _) => format!("NOT MADE: {error}"),
         (None, 0) => format!("{} claims hold", record.count(Verdict::Pass)),

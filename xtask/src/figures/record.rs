@@ -14,7 +14,7 @@ use std::sync::LazyLock;
 use std::time::{Duration, SystemTime};
 
 /// One figure as it was made, or why it was not.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Record {
     pub(super) id: String,
     pub(super) title: String,
@@ -108,12 +108,7 @@ impl Record {
             fingerprint,
             finished: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
             wall_time_s: elapsed.as_secs_f64(),
-            files: Vec::new(),
-            sums: Vec::new(),
-            rows: 0,
-            columns: Map::new(),
-            claims: Vec::new(),
-            error: None,
+            ..Self::default()
         }
     }
 

@@ -1,33 +1,23 @@
-//! Results of earlier runs that still hold: same figure, parameters, seed and sources.
+//! Results of earlier runs that still hold: same figure, parameters, seed and program.
 
-use super::record::Record;
+use super::record::{Record, check_sum};
 use super::select::Job;
 use serde_json::json;
-use std::hash::{DefaultHasher, Hasher};
 use std::path::Path;
+use std::sync::LazyLock;
 
-// `SOURCES`, a hash for each system, and `BUILT_WITH`: the compiler, its target and its options.
-include!(concat!(env!("OUT_DIR"), "/sources.rs"));
+/// Check sum of this program, which cargo makes anew when a source, a dependency, a feature or the compiler changes; none if it cannot
+/// be read.
+static PROGRAM: LazyLock<Option<String>> = LazyLock::new(|| {
+    let program = std::fs::read(std::env::current_exe().ok()?).ok()?;
+    Some(check_sum(&program))
+});
 
-/// Fingerprint of all that a figure's result depends on; none for one whose system has no sources here.
+/// Fingerprint of all that a figure's result depends on.
 pub(super) fn fingerprint(job: &Job, seed: u64) -> Option<String> {
-    let id = job.figure.about().id;
-    let system = id.split('-').next().unwrap_or_default();
-    let (_, sources) = SOURCES.iter().find(|(name, _)| *name == system)?;
-    let mut hasher = DefaultHasher::new();
-    hasher.write(
-        json!([
-            id,
-            job.run.parameters,
-            seed,
-            sources,
-            BUILT_WITH,
-            fewbits_experiments::FEATURES
-        ])
-        .to_string()
-        .as_bytes(),
-    );
-    Some(format!("{:016x}", hasher.finish()))
+    let program = PROGRAM.as_ref()?;
+    let all = json!([job.figure.about().id, job.run.parameters, seed, program]);
+    Some(check_sum(all.to_string().as_bytes()))
 }
 
 /// The record of an earlier run with this fingerprint, if all its files are as it wrote them, the plot included where it is wanted.

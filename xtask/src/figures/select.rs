@@ -16,33 +16,22 @@ pub(super) fn figures(patterns: &[String]) -> Result<Vec<&'static dyn AnyFigure>
     let figures = all();
     let mut chosen = vec![patterns.is_empty(); figures.len()];
     for pattern in patterns {
-        let matcher = Glob::new(pattern)
-            .map_err(|error| Error::BadPattern {
-                pattern: pattern.clone(),
-                reason: error.kind().to_string(),
-            })?
-            .compile_matcher();
-        let mut found = false;
-        for (figure, chosen) in figures.iter().zip(&mut chosen) {
-            if matcher.is_match(figure.about().id) {
-                *chosen = true;
-                found = true;
-            }
-        }
-        if !found {
-            let ids: Vec<_> = figures.iter().map(|figure| figure.about().id).collect();
+        let glob = Glob::new(pattern).map_err(|error| Error::BadPattern {
+            pattern: pattern.clone(),
+            reason: error.kind().to_string(),
+        })?;
+        let (matcher, ids) = (glob.compile_matcher(), figures.iter().map(|figure| figure.about().id));
+        let matching: Vec<bool> = ids.clone().map(|id| matcher.is_match(id)).collect();
+        if !matching.contains(&true) {
             return Err(Error::UnknownFigure {
                 pattern: pattern.clone(),
-                advice: advice(pattern, &ids),
+                advice: advice(pattern, &ids.collect::<Vec<_>>()),
             });
         }
+        chosen.iter_mut().zip(matching).for_each(|(chosen, own)| *chosen |= own);
     }
-    Ok(figures
-        .into_iter()
-        .zip(chosen)
-        .filter(|(_, chosen)| *chosen)
-        .map(|(figure, _)| figure)
-        .collect())
+    let chosen = figures.into_iter().zip(chosen).filter(|(_, chosen)| *chosen);
+    Ok(chosen.map(|(figure, _)| figure).collect())
 }
 
 /// The ids that are nearest to what was asked for; all if none is near.

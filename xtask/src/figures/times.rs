@@ -5,7 +5,6 @@
 use super::record::Record;
 use std::collections::BTreeMap;
 use std::fmt::Write;
-use std::time::Duration;
 
 /// Columns: id, seconds at full counts, seconds of a quick run.
 const TABLE: &str = include_str!("times.csv");
@@ -36,27 +35,9 @@ pub(super) fn table(records: &BTreeMap<String, Record>) -> String {
     page
 }
 
-/// A duration in words: `12 s`, `3 min`, `1 h 5 min`.
-pub(super) fn in_words(duration: Duration) -> String {
-    let seconds = duration.as_secs_f64();
-    let minutes = (seconds / 60.0).round() as u64;
-    match seconds {
-        s if s < 9.95 => format!("{s:.1} s"),
-        s if s < 100.0 => format!("{s:.0} s"),
-        _ if minutes < 100 => format!("{minutes} min"),
-        _ => format!("{} h {} min", minutes / 60, minutes % 60),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn durations_in_words_have_one_or_two_units() {
-        let words = [0.04, 9.97, 61.0, 100.0, 6100.0].map(|s| in_words(Duration::from_secs_f64(s)));
-        assert_eq!(words, ["0.0 s", "10 s", "61 s", "2 min", "1 h 42 min"]);
-    }
 
     #[test]
     fn every_line_of_the_table_names_a_figure() {

@@ -58,10 +58,6 @@ fn three(sensors: &CodedSensors, variances: &[f64]) -> Result<Vec<Row>, Error> {
     ])
 }
 
-fn find<'a>(rows: &'a [Row], name: &str) -> Option<&'a Row> {
-    first(rows, |r| r.assign == name)
-}
-
 impl Figure for Table {
     figure!(Parameters => Rows, "assign-table6-1", "Three assignments of eight Gray bits to eight sensors", "Movaghati, thesis, table 6.1",
         "The optimum of the linear assignment problem gives middling sensors the coarse bits and keeps the noisy ones for the fine \

@@ -38,7 +38,7 @@ pub(crate) static LOSSY: Simulated<Linear, Step> = Simulated {
     },
     claims: |rows, claims| {
         for loss in ["loss 0.1", "loss 0.3"] {
-            rows.beats(claims, (MODELLED, IGNORED), (loss, 1.0), &[Part::Position]);
+            rows.beat(claims, LOSSY.pairs, (loss, 1.0), &[Part::Position]);
         }
         let what = "gain in squared position error by modelling the loss (m^2)";
         claims.references("gain", what, &rows.paired, |p| (p.world.clone(), p.position.scaled(-1.0)));
@@ -135,7 +135,7 @@ pub(crate) static SCHEDULED: Simulated<Linear, Step, Vec<Bound>> = Simulated {
                 claims.at_least(format!("above-bound-{scheme}-l{l}"), what, ratio, 0.995);
             }
         }
-        rows.beats(claims, ("scheduled", "CFwMD"), (TWO, 1.0), &[Part::Position]);
+        rows.beat(claims, &[("scheduled", "CFwMD")], (TWO, 1.0), &[Part::Position]);
         let key = |b: &Bound| (format!("N = {}, l = {}", b.sensors, b.l), b.bound_m);
         claims.references("bound", "information bound of CFwMD (m)", bounds, key);
     },

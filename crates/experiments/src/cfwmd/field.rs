@@ -44,7 +44,7 @@ impl Figure for Fig7 {
          grid after about ten steps.");
 
     fn run(&self, shown: &Shown, context: &Context<'_>) -> Result<Map, Error> {
-        let world = Plane::new(&Field::new(&[2.0]), 2.0)?;
+        let world = Plane::new(&Field::default(), 2.0)?;
         let draws = world.draw(context.stream("cfwmd-nonlinear").indexed(shown.trial));
         let states = std::iter::once(world.start.mean()).chain(&draws.truth).enumerate();
         let sensors = world.sensors.iter().map(|s| s.position()).enumerate();
@@ -83,13 +83,11 @@ pub(crate) static FIG8: Simulated<Field, Step> = Simulated {
     pairs: &[("all", "CFwMD"), ("CFwMD", "CFoMD"), ("CFoMD", "random")],
     setting: || Field {
         particles: 5000,
-        ..Field::new(&[2.0])
+        ..Field::default()
     },
     simulate: |setting, context| setting.at_budgets(context, "", &FOUR),
     claims: |rows, claims| {
-        for pair in [("all", "CFwMD"), ("CFwMD", "CFoMD")] {
-            rows.beats(claims, pair, ("", 2.0), &[Part::Position]);
-        }
+        rows.beat(claims, &[("all", "CFwMD"), ("CFwMD", "CFoMD")], ("", 2.0), &[Part::Position]);
         let what = "CFoMD has the smaller time-averaged position error than random (ratio)";
         claims.below("CFoMD-beats-random", what, rows.ratio("CFoMD", "random", 2.0), 1.0);
         let error = |scheme, k| Some(rows.step(scheme, 2.0, k)?.position_rmse.value);
@@ -115,7 +113,8 @@ pub(crate) static FIG9: Simulated<Field, Summary> = Simulated {
     pairs: &[("CFwMD", "CFoMD"), ("CFwMD", "random"), ("random", "CFoMD")],
     setting: || Field {
         particles: 2500,
-        ..Field::new(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0])
+        messages: (1..=9).map(f64::from).collect(),
+        ..Field::default()
     },
     simulate: |setting, context| {
         let mut all = setting.at_budgets(context, "", &FOUR[1..])?;
@@ -134,7 +133,7 @@ pub(crate) static FIG9: Simulated<Field, Summary> = Simulated {
             claims.below(format!("censoring-l{l}"), what, rows.ratio("CFoMD", "random", l), 1.0);
         }
         for l in [4.0, 5.0, 6.0] {
-            rows.beats(&mut claims.showing("cfwmd-9"), ("random", "CFoMD"), ("", l), &[Part::Velocity]);
+            rows.beat(&claims.showing("cfwmd-9"), &[("random", "CFoMD")], ("", l), &[Part::Velocity]);
         }
         let error = |scheme, l| Some(rows.at(scheme, l)?.position_rmse.value);
         let gap = minus(error("CFoMD", 1.0), error("CFwMD", 1.0));
@@ -161,7 +160,8 @@ pub(crate) static FIG10: Simulated<Field, Step> = Simulated {
     setting: || Field {
         trials: 400,
         particles: 2500,
-        ..Field::new(&THREE)
+        messages: THREE.into(),
+        ..Field::default()
     },
     simulate: |setting, context| {
         let mut all = setting.at_budgets(context, "", &FUSED)?;
@@ -176,9 +176,9 @@ pub(crate) static FIG10: Simulated<Field, Step> = Simulated {
     shown: |_, run| run.world.is_empty(),
     claims: |rows, claims| {
         for l in [4.0, 6.0] {
-            rows.beats(claims, ("CFwMD2", "CFwMD"), ("", l), &[Part::Position]);
+            rows.beat(claims, &[("CFwMD2", "CFwMD")], ("", l), &[Part::Position]);
         }
-        rows.beats(&mut claims.showing("cfwmd-12"), ("CFwMD2", "CFwMD"), (MANY, 2.0), &BOTH);
+        rows.beat(&claims.showing("cfwmd-12"), &[("CFwMD2", "CFwMD")], (MANY, 2.0), &BOTH);
     },
     ..Simulated::BASE
 };
@@ -195,7 +195,8 @@ pub(crate) static TABLE3: Simulated<Field, Rates> = Simulated {
     setting: || Field {
         drawn_start: None,
         particles: 2500,
-        ..Field::new(&THREE)
+        messages: THREE.into(),
+        ..Field::default()
     },
     simulate: |setting, context| {
         let mut all = setting.at_budgets(context, ON_MEAN, &FUSED)?;

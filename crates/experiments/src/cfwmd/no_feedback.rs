@@ -24,8 +24,8 @@ pub(crate) static FIG3: Simulated<Linear, Step> = Simulated {
     simulate: |setting, context| setting.at_budgets(context, "", &FOUR_ALONE),
     claims: |rows, claims| {
         rows.in_order(claims, &["all", "CFwMD", "CFoMD", "random"], ("", 1.0), &BOTH);
-        rows.beats(claims, ("CFwMD", "CFoMD"), ("", 1.0), &BOTH);
-        rows.beats(claims, ("CFoMD", "random"), ("", 1.0), &[Part::Position]);
+        rows.beat(claims, &[("CFwMD", "CFoMD")], ("", 1.0), &BOTH);
+        rows.beat(claims, &[("CFoMD", "random")], ("", 1.0), &[Part::Position]);
         let rate = rows.at("CFwMD", 1.0).map(|r| r.rate);
         claims.within("rate-exact", "without feedback the rate is exactly the budget", rate, 1.0, 4.0);
         let gain = rows.ratio("CFwMD", "CFoMD", 1.0).map(|r| 1.0 - r);
@@ -63,15 +63,14 @@ pub(crate) static NO_FEEDBACK: Simulated<Linear, Step> = Simulated {
         setting.at_budgets(context, "", &schemes)
     },
     claims: |rows, claims| {
-        for pair in [
+        let pairs = [
             ("exact", "ignored"),
             ("joint Gaussian", "ignored"),
             ("heuristic", "ignored"),
-            ("joint Gaussian", "heuristic"),
-        ] {
-            rows.beats(claims, pair, ("", 1.0), &[Part::Position]);
-        }
-        rows.beats(&mut claims.showing("cfwmd-3"), ("ignored", "no history"), ("", 1.0), &[Part::Position]);
+        ];
+        rows.beat(claims, &pairs, ("", 1.0), &[Part::Position]);
+        rows.beat(claims, &[("joint Gaussian", "heuristic")], ("", 1.0), &[Part::Position]);
+        rows.beat(&claims.showing("cfwmd-3"), &[("ignored", "no history")], ("", 1.0), &[Part::Position]);
         let gap = rows
             .pair(("exact", "joint Gaussian"), "", 1.0)
             .map(|p| p.position.value);

@@ -38,40 +38,55 @@ impl Main for Rates {
 
     /// Rates of both schemes against the budget, with the printed ones.
     fn plot(rows: &[Self]) -> Plot {
-        type Columns = (fn(&Rates) -> Measured, fn(&Rates) -> Option<f64>);
-        let columns: [(&str, Columns); 2] = [
-            ("State feedback (CFwMD)", (|r| r.state, |r| r.printed_state)),
-            ("State and covariance feedback (CFwMD2)", (|r| r.covariance, |r| r.printed_covariance)),
-        ];
-        let panel = |(title, (ours, printed)): (&str, Columns)| {
-            let worlds = distinct(rows, |r| r.setting.clone());
-            let first = rows.iter().filter(|r| Some(&r.setting) == worlds.first());
+        let worlds = distinct(rows, |r| r.setting.clone());
+        let panel = |i: usize| {
             let layers = worlds.iter().enumerate().flat_map(|(colour, world)| {
-                let own = rows.iter().filter(|r| r.setting == *world);
-                Layer::curve(world.as_str(), colour, own.map(|r| (r.l, ours(r) - r.l)).collect())
+                let ours = under(rows, world).map(|r| (r.l, r.both()[i].0 - r.l));
+                Layer::curve(world.as_str(), colour, ours.collect())
             });
-            Panel::linear(title, "message budget l / (messages/step)", "rate minus budget / (messages/step)")
-                .with(Layer::dashed("printed", points(first, |r| (r.l, printed(r).map(|p| p - r.l)))).coloured(7))
+            let first = worlds.iter().take(1).flat_map(|world| under(rows, world));
+            let printed = points(first, |r| (r.l, r.both()[i].1.map(|p| p - r.l)));
+            Panel::linear(FEEDBACK[i].1, "message budget l / (messages/step)", "rate minus budget / (messages/step)")
+                .with(Layer::dashed("printed", printed).coloured(7))
                 .with_all(layers)
         };
-        Plot::grid(2, columns.map(panel).into())
+        Plot::grid(2, vec![panel(0), panel(1)])
+    }
+}
+
+/// What is fed back, briefly and in words.
+const FEEDBACK: [(&str, &str); 2] = [
+    ("state", "State feedback (CFwMD)"),
+    ("covariance", "State and covariance feedback (CFwMD2)"),
+];
+
+fn under<'a>(rows: &'a [Rates], world: &'a str) -> impl Iterator<Item = &'a Rates> {
+    select(rows, move |r| r.setting == world)
+}
+
+impl Rates {
+    /// The rate under each feedback, ours and as printed.
+    fn both(&self) -> [(Measured, Option<f64>); 2] {
+        [
+            (self.state, self.printed_state),
+            (self.covariance, self.printed_covariance),
+        ]
     }
 }
 
 /// Claims that the printed rates are met in one world.
 pub(super) fn as_printed(claims: &mut Claims, rows: &[Rates], world: &str) {
-    type Column = fn(&Rates) -> Measured;
-    let columns: [(&str, Column); 2] = [("state", |r| r.state), ("covariance", |r| r.covariance)];
-    for (name, of) in columns {
+    for (i, (name, _)) in FEEDBACK.iter().enumerate() {
         let what = format!("rate with {name} feedback as printed ({world})");
-        let own = rows.iter().filter(|r| r.setting == world);
         claims.shown(&format!("unmet-{name}"));
-        claims.references(&format!("printed-{name}"), &what, own, |r| (format!("l = {}", r.l), of(r).value));
+        claims.references(&format!("printed-{name}"), &what, under(rows, world), |r| {
+            (format!("l = {}", r.l), r.both()[i].0.value)
+        });
     }
 }
 
 /// Our rate minus the printed one.
 pub(super) fn misses(rows: &[Rates], world: &str, l: f64) -> Option<[Measured; 2]> {
-    let row = rows.iter().find(|r| r.setting == world && r.l == l)?;
-    Some([row.state - row.printed_state?, row.covariance - row.printed_covariance?])
+    let [(state, printed_state), (covariance, printed)] = first(rows, |r| r.setting == world && r.l == l)?.both();
+    Some([state - printed_state?, covariance - printed?])
 }

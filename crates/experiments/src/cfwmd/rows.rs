@@ -205,23 +205,17 @@ impl<M, X> Rows<M, X> {
 
     /// Position error of one scheme over that of another.
     pub(super) fn ratio(&self, a: &str, b: &str, l: f64) -> Option<f64> {
-        Some(self.at(a, l)?.position_rmse.value / self.at(b, l)?.position_rmse.value)
+        over(self.at(a, l)?.position_rmse, self.at(b, l)?.position_rmse)
     }
 
     pub(super) fn pair(&self, (a, b): (&str, &str), world: &str, l: f64) -> Option<&Paired> {
         first(&self.paired, |p| (p.first, p.second, p.world.as_str(), p.l) == (a, b, world, l))
     }
 
-    /// Claims that, in squared error, `first` beats `second` by at least three paired standard errors.
-    pub(super) fn beats(
-        &self,
-        claims: &mut Claims,
-        (first, second): (&str, &str),
-        (world, l): (&str, f64),
-        parts: &[Part],
-    ) {
-        let pair = self.pair((first, second), world, l);
-        for part in parts {
+    /// Claims that, in squared error, the first of each pair beats the second by at least three paired standard errors.
+    pub(super) fn beat(&self, claims: &Claims, pairs: &[(&str, &str)], (world, l): (&str, f64), parts: &[Part]) {
+        for ((first, second), part) in product(pairs, parts) {
+            let pair = self.pair((first, second), world, l);
             let (what, difference) = match part {
                 Part::Position => ("position", pair.map(|p| p.position)),
                 Part::Velocity => ("velocity", pair.map(|p| p.velocity)),
@@ -241,7 +235,7 @@ impl<X> Rows<Step, X> {
     }
 
     /// Claims that at every step the schemes are in this order, smallest error first, but for two standard errors.
-    pub(super) fn in_order(&self, claims: &mut Claims, schemes: &[&str], (world, l): (&str, f64), parts: &[Part]) {
+    pub(super) fn in_order(&self, claims: &Claims, schemes: &[&str], (world, l): (&str, f64), parts: &[Part]) {
         let curve = |scheme: &str| -> Vec<&Step> {
             select(&self.main, |r| (r.run.scheme, r.run.world.as_str(), r.run.l) == (scheme, world, l)).collect()
         };
@@ -254,10 +248,7 @@ impl<X> Rows<Step, X> {
             let id = format!("order-{part:?}{world}-l{l}").to_lowercase().replace(' ', "-");
             let order = schemes.join(" < ");
             let what = format!("at every step {order} in {part:?} error, but for two standard errors {world}");
-            claims.all(id, what, neighbours, |(a, b)| {
-                let error = a.error().hypot(b.error());
-                a.value <= b.value + 2.0 * error
-            });
+            claims.all(id, what, neighbours, |(a, b)| a.value <= b.value + 2.0 * a.error().hypot(b.error()));
         }
     }
 }

@@ -46,13 +46,12 @@ pub(crate) static FIG1: Simulated<Linear, Step> = Simulated {
     },
     claims: |rows, claims| {
         rows.in_order(claims, &["all", "CFwMD", "CFoMD", "random"], ("", 1.0), &BOTH);
-        for pair in [
+        let pairs = [
             ("CFwMD", "CFoMD"),
             ("CFwMD2", "CFwMD"),
             ("CFwMD2", "trigger, centre's s"),
-        ] {
-            rows.beats(claims, pair, ("", 1.0), &[Part::Position]);
-        }
+        ];
+        rows.beat(claims, &pairs, ("", 1.0), &[Part::Position]);
         // All-send is a Kalman filter: its RMSE is the root of its covariance at every step, for certain.
         let exact = exact_all_send(2);
         let all = rows.main.iter().filter(|r| r.run.scheme == "all");
@@ -103,9 +102,9 @@ pub(crate) static FIG2: Simulated<Linear, Step> = Simulated {
     setting: || Linear::scalar(4, &BUDGETS),
     simulate: |setting, context| setting.at_budgets(context, "", &CENSORED),
     claims: |rows, claims| {
-        rows.beats(claims, ("CFwMD", "CFwMD2"), ("", 1.0), &[Part::Position]);
+        rows.beat(claims, &[("CFwMD", "CFwMD2")], ("", 1.0), &[Part::Position]);
         for l in [1.2, 1.5, 2.0] {
-            rows.beats(claims, ("CFwMD2", "CFwMD"), ("", l), &BOTH);
+            rows.beat(claims, &[("CFwMD2", "CFwMD")], ("", l), &BOTH);
         }
         let gap = rows.ratio("CFwMD", "CFwMD2", 3.0).map(|r| r - 1.0);
         claims.below("little-gain", "at l = 3 covariance feedback gains less than 2%", gap, 0.02);

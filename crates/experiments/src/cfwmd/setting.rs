@@ -45,40 +45,42 @@ fn cost(trials: u64, steps: u64, budgets: usize, step_seconds: f64) -> Cost {
 parameters! {
     /// A target on a line among identical linear sensors.
     #[derive(Debug, Clone)]
-    pub point struct Linear {
-        pub(super) trials: u64 [2..=1_000_000] => "Monte-Carlo trials.",
-        pub(super) steps: u64 [1..=1000] => "Time steps of a trial.",
-        pub(super) sensors: u64 [1..=100] => "Sensors.",
-        pub(super) messages: Vec<f64> [1e-3..=100.0; 1..=20] => "Message budgets, each at most the number of sensors.",
-        pub(super) acceleration_variance: f64 [1e-12..=1e6] => "Variance of the acceleration (m²/s⁴).",
+    pub struct Linear {
+        pub(super) trials: u64 [2..=1_000_000] = 5000 => quick 100 => "Monte-Carlo trials.",
+        pub(super) steps: u64 [1..=1000] = 20 => "Time steps of a trial.",
+        pub(super) sensors: u64 [1..=100] = 2 => "Sensors.",
+        pub(super) messages: Vec<f64> [1e-3..=100.0; 1..=20] = vec![1.0] => "Message budgets, each at most the number of sensors.",
+        pub(super) acceleration_variance: f64 [1e-12..=1e6] = 4.0 => "Variance of the acceleration (m²/s⁴).",
         /// Noise variances of what a sensor measures: the position (m²), or position and velocity (m², m²/s²).
-        pub(super) noise_variances: Vec<f64> [1e-6..=1e6; 1..=2],
-        pub(super) start: Vec<f64> [-1e6..=1e6; 2..=2] => "Mean position (m) and velocity (m/s) at the start.",
+        pub(super) noise_variances: Vec<f64> [1e-6..=1e6; 1..=2] = vec![1.0],
+        pub(super) start: Vec<f64> [-1e6..=1e6; 2..=2] = vec![0.0, 10.0] => "Mean position (m) and velocity (m/s) at the start.",
         /// Variances of position and velocity at the start, from which the truth is drawn; 0 is known.
-        pub(super) start_variances: Vec<f64> [0.0..=1e6; 2..=2],
-        pub(super) start_correlation: f64 [-1.0..=1.0] => "Correlation of position and velocity at the start.",
+        pub(super) start_variances: Vec<f64> [0.0..=1e6; 2..=2] = vec![0.0, 0.0],
+        pub(super) start_correlation: f64 [-1.0..=1.0] = 0.0 => "Correlation of position and velocity at the start.",
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub(super) particles: Option<u64> [1..=1_000_000] => "Particles of the particle filters.",
+        pub(super) particles: Option<u64> [1..=1_000_000] = None => "Particles of the particle filters.",
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub(super) losses: Option<Vec<f64>> [0.0..=0.99; 1..=20] => "Probabilities that the link loses a message.",
+        pub(super) losses: Option<Vec<f64>> [0.0..=0.99; 1..=20] = None => "Probabilities that the link loses a message.",
     }
+    cost |p| {
+        let fusion = p.sensors as f64 * 2e-6 + p.cloud() as f64 * 2e-8;
+        cost(p.trials, p.steps, p.messages.len(), fusion)
+    };
+    check |p| {
+        let sensors = p.sensors;
+        let beyond = |l: &f64| (*l > sensors as f64).then(|| format!("more messages than the {sensors} sensors send"));
+        accept_each("messages", &p.messages, beyond)
+    };
+    quicken |p| p.particles = p.particles.map(|_| 100);
 }
 
 impl Linear {
     /// The scalar experiment of so many sensors.
     pub(super) fn scalar(sensors: u64, messages: &[f64]) -> Self {
         Self {
-            trials: 5000,
-            steps: 20,
             sensors,
             messages: messages.into(),
-            acceleration_variance: 4.0,
-            noise_variances: vec![1.0],
-            start: vec![0.0, 10.0],
-            start_variances: vec![0.0, 0.0],
-            start_correlation: 0.0,
-            particles: None,
-            losses: None,
+            ..Self::default()
         }
     }
 
@@ -118,79 +120,23 @@ impl Linear {
     }
 }
 
-impl Default for Linear {
-    fn default() -> Self {
-        Self::scalar(2, &[1.0])
-    }
-}
-
-impl Quick for Linear {
-    fn quicken(&mut self) {
-        self.trials = 100;
-        self.particles = self.particles.map(|_| 100);
-    }
-
-    fn cost(&self) -> Cost {
-        let fusion = self.sensors as f64 * 2e-6 + self.cloud() as f64 * 2e-8;
-        cost(self.trials, self.steps, self.messages.len(), fusion)
-    }
-
-    fn check(&self) -> Result<(), Refusal> {
-        let sensors = self.sensors;
-        let beyond = |l: &f64| (*l > sensors as f64).then(|| format!("more messages than the {sensors} sensors send"));
-        accept_each("messages", &self.messages, beyond)
-    }
-}
-
 parameters! {
     /// A target in a plane among nine sensors of received power.
     #[derive(Debug, Clone)]
-    pub point struct Field {
-        pub(super) trials: u64 [2..=1_000_000] => "Monte-Carlo trials.",
-        pub(super) steps: u64 [1..=1000] => "Time steps of a trial.",
-        pub(super) messages: Vec<f64> [1e-3..=9.0; 1..=20] => "Message budgets, each at most nine.",
-        pub(super) particles: u64 [2..=1_000_000] => "Particles of every filter.",
-        pub(super) spacing_m: f64 [1e-3..=1e6] => "Distance of neighbouring sensors of the 3 by 3 grid (m).",
-        pub(super) acceleration_variance: f64 [1e-12..=1e6] => "Variance of the acceleration of each axis (m²/s⁴).",
-        pub(super) noise_variance: f64 [1e-6..=1e6] => "Variance of the measurement noise.",
-        pub(super) start: Vec<f64> [-1e6..=1e6; 4..=4] => "Prior mean of x (m), its velocity (m/s), y and its velocity.",
-        pub(super) start_variances: Vec<f64> [1e-9..=1e6; 4..=4] => "Prior variances of the same.",
+    pub struct Field {
+        pub(super) trials: u64 [2..=1_000_000] = 200 => quick 24 => "Monte-Carlo trials.",
+        pub(super) steps: u64 [1..=1000] = 20 => "Time steps of a trial.",
+        pub(super) messages: Vec<f64> [1e-3..=9.0; 1..=20] = vec![2.0] => "Message budgets, each at most nine.",
+        pub(super) particles: u64 [2..=1_000_000] = 10_000 => quick 500 => "Particles of every filter.",
+        pub(super) spacing_m: f64 [1e-3..=1e6] = 10.0 => "Distance of neighbouring sensors of the 3 by 3 grid (m).",
+        pub(super) acceleration_variance: f64 [1e-12..=1e6] = 0.1 => "Variance of the acceleration of each axis (m²/s⁴).",
+        pub(super) noise_variance: f64 [1e-6..=1e6] = 1.0 => "Variance of the measurement noise.",
+        /// Prior mean of x (m), its velocity (m/s), y and its velocity.
+        pub(super) start: Vec<f64> [-1e6..=1e6; 4..=4] = vec![-8.0, 2.0, -8.0, 2.0],
+        pub(super) start_variances: Vec<f64> [1e-9..=1e6; 4..=4] = vec![9.0, 4.0, 9.0, 4.0] => "Prior variances of the same.",
         /// Whether the truth is drawn from the prior; the publication's starts at its mean.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub(super) drawn_start: Option<bool>,
+        pub(super) drawn_start: Option<bool> = Some(false),
     }
-}
-
-impl Field {
-    pub(super) fn new(messages: &[f64]) -> Self {
-        Self {
-            trials: 200,
-            steps: 20,
-            messages: messages.into(),
-            particles: 10_000,
-            spacing_m: 10.0,
-            acceleration_variance: 0.1,
-            noise_variance: 1.0,
-            start: vec![-8.0, 2.0, -8.0, 2.0],
-            start_variances: vec![9.0, 4.0, 9.0, 4.0],
-            drawn_start: Some(false),
-        }
-    }
-}
-
-impl Default for Field {
-    fn default() -> Self {
-        Self::new(&[2.0])
-    }
-}
-
-impl Quick for Field {
-    fn quicken(&mut self) {
-        self.trials = 24;
-        self.particles = 500;
-    }
-
-    fn cost(&self) -> Cost {
-        cost(self.trials, self.steps, self.messages.len(), self.particles as f64 * 1e-7)
-    }
+    cost |p| cost(p.trials, p.steps, p.messages.len(), p.particles as f64 * 1e-7);
 }

@@ -54,9 +54,7 @@ pub(crate) static FIG4: Simulated<Linear, Step> = Simulated {
     },
     claims: |rows, claims| {
         for world in &[1.0, STATED].map(world) {
-            for pair in FIG4.pairs {
-                rows.beats(claims, *pair, (world, 1.0), &[Part::Position]);
-            }
+            rows.beat(claims, FIG4.pairs, (world, 1.0), &[Part::Position]);
             rows.in_order(claims, &["all", "CFwMD", "CFoMD", "random"], (world, 1.0), &BOTH);
         }
         let own = world(1.0);
@@ -77,7 +75,7 @@ pub(crate) static FIG5: Simulated<Linear, Step> = Simulated {
     shown: |p, run| run.world == world(p.acceleration_variance),
     claims: |rows, claims| {
         for l in [1.0, 2.0, 3.0] {
-            rows.beats(claims, ("CFwMD2", "CFwMD"), (&world(1.0), l), &[Part::Position]);
+            rows.beat(claims, FIG5.pairs, (&world(1.0), l), &[Part::Position]);
         }
         let stated = rows.pair(("CFwMD2", "CFwMD"), &world(STATED), 1.0);
         let z = stated.and_then(|p| p.position.z_score(0.0));
@@ -119,7 +117,7 @@ pub(crate) static FIG6: Simulated<Linear, Step> = Simulated {
     shown: |p, run| run.world == world(p.acceleration_variance) && run.scheme != SAME_TRIALS,
     claims: |rows, claims| {
         for world in &[1.0, STATED].map(world) {
-            rows.beats(claims, ("CFwMD", "CFoMD"), (world, 1.0), &[Part::Position]);
+            rows.beat(claims, &FIG6.pairs[..1], (world, 1.0), &[Part::Position]);
             let ratio = rows.ratio(&format!("exact, {world}"), &format!("{SAME_TRIALS}, {world}"), 1.0);
             let what = format!("the joint Gaussian belief is as good as the exact filter, {world} (erratum cfwmd-15)");
             let id = format!("joint-is-exact-{}", world.replace(' ', "-"));

@@ -128,6 +128,11 @@ pub trait Keyed {
     fn key(&self) -> String;
 }
 
+/// The row of this name.
+pub fn find<'r, R: Keyed>(rows: &'r [R], key: &str) -> Option<&'r R> {
+    rows.iter().find(|row| row.key() == key)
+}
+
 /// What a reference can be compared with: a number, perhaps missing, perhaps with a standard error.
 pub trait Cell {
     /// The number with its standard error.

@@ -13,6 +13,8 @@ use rand_distr::StandardNormal;
 const PLAN: &str = include_str!("rooms.plan");
 /// Width of a square of the plan, and of a cell, m.
 pub(super) const CELL: f64 = 0.25;
+/// Nearer than this a source is found: two cells and a rounding.
+pub(super) const NEAR: f64 = 2.0 * CELL + 1e-9;
 /// Diffusivity, m^2/s.
 const DIFFUSIVITY: f64 = 0.05;
 /// Wind from door to window, m^2/s.

@@ -3,31 +3,28 @@
 use super::common::{B, CHAINS, Scheme, Settings, tracks};
 use super::summary::{Summary, summary};
 use crate::prelude::*;
-use fewbits_diffusive::message::{SampleCode, Wire};
+use fewbits_diffusive::message::SampleCode;
 
-fn schemes() -> Vec<Scheme> {
-    let raw = |name, samples| Scheme {
-        wire: Wire {
-            samples,
-            ..Wire::default()
-        },
-        ..Scheme::new(name, B, 15.0)
+const SCHEMES: [&str; 8] = [
+    "raw-64-bit",
+    "raw-9-bit",
+    "raw-6-bit",
+    "gmm-4",
+    "gaussian-9",
+    "gaussian known rate",
+    "gmm-4 known rate",
+    "lpg-2x5 known rate",
+];
+
+/// The scheme of this name, its raw samples in so many bits.
+fn scheme(name: &'static str) -> Scheme {
+    let mut scheme = Scheme::new(name, B, 15.0);
+    scheme.wire.samples = match name {
+        "raw-9-bit" => Some(SampleCode { bits: 9, step: 1.0 }),
+        "raw-6-bit" => Some(SampleCode { bits: 6, step: 8.0 }),
+        _ => scheme.wire.samples,
     };
-    let raw = [
-        raw("raw-64-bit", None),
-        raw("raw-9-bit", Some(SampleCode { bits: 9, step: 1.0 })),
-        raw("raw-6-bit", Some(SampleCode { bits: 6, step: 8.0 })),
-    ];
-    let forms = [
-        "gmm-4",
-        "gaussian-9",
-        "gaussian known rate",
-        "gmm-4 known rate",
-        "lpg-2x5 known rate",
-    ];
-    raw.into_iter()
-        .chain(forms.map(|name| Scheme::new(name, B, 15.0)))
-        .collect()
+    scheme
 }
 
 pub struct Bytes;
@@ -43,8 +40,8 @@ impl Figure for Bytes {
     }
 
     fn run(&self, p: &Settings, context: &Context<'_>) -> Result<Vec<Summary>, Error> {
-        let of = |scheme: &Scheme| summary(scheme, p, &tracks(context, p, scheme)?);
-        schemes().iter().map(of).collect()
+        let of = |scheme: Scheme| summary(&scheme, p, &tracks(context, p, &scheme)?);
+        SCHEMES.into_iter().map(scheme).map(of).collect()
     }
 
     fn claims(&self, _: &Settings, rows: &Vec<Summary>, claims: &mut Claims) {

@@ -22,6 +22,8 @@ const NODES: usize = 4096;
 const RATE_STEP: f64 = 0.027;
 /// Sensors between two tests whether a cell still matters.
 const BLOCK: usize = 4;
+/// Mass of the credible regions.
+const CREDIBLE: f64 = 0.9;
 /// A cell whose log likelihood is below that of the best by more than this has no weight.
 const NEGLIGIBLE: f64 = 60.0;
 
@@ -117,10 +119,12 @@ impl PlanBelief {
         Self { weights, mode, misfit }
     }
 
-    /// The mass of the cells that are more probable than this one, and of this one.
-    pub fn above(&self, cell: usize) -> [f64; 2] {
+    /// Whether the credible region of nine tenths holds a cell. The region has exactly that mass: the cell that would exceed it belongs
+    /// to it by `chance`, uniform from 0 to 1.
+    pub fn covers(&self, cell: usize, chance: f64) -> bool {
         let own = self.weights[cell];
-        [self.weights.iter().filter(|weight| **weight > own).sum(), own]
+        let above: f64 = self.weights.iter().filter(|weight| **weight > own).sum();
+        above + chance * own < CREDIBLE
     }
 }
 

@@ -1,6 +1,6 @@
 //! `diffusive-ranks`: a leak found by sensors whose response is not known, from ranks and from three bits.
 
-use super::building::{Building, Case, Placement, RATES};
+use super::building::{Building, Case, NEAR, Placement, RATES};
 use super::common::{fraction, median};
 use super::plan_belief::{Instrument, PlanBelief, Report, of_words};
 use crate::prelude::*;
@@ -13,10 +13,6 @@ const GAIN: f64 = 2.0;
 const NODES: [usize; 2] = [5, 3];
 /// Logarithm of more than the number of rates and responses that are summed.
 const SUMMED: f64 = 10.0;
-/// Mass of the credible regions.
-const CREDIBLE: f64 = 0.9;
-/// Two cells and a rounding.
-const NEAR: f64 = 2.0 * super::building::CELL + 1e-9;
 const CASE: Case = Case {
     windy: false,
     noise: 0.05,
@@ -143,12 +139,9 @@ fn one(building: &Building, sensors: usize, stream: Stream) -> Result<[(f64, boo
         exponent: rng.random_range(EXPONENTS[0]..EXPONENTS[1]),
         gain: GAIN.powf(rng.random_range(-1.0..1.0)),
     };
-    // The region of exactly nine tenths: the cell that would exceed it belongs to it by chance.
     let chance: f64 = rng.random();
-    Ok(beliefs(&placement, truth)?.map(|belief| {
-        let [above, own] = belief.above(placement.source);
-        (placement.error(&belief), above + chance * own < CREDIBLE)
-    }))
+    let judge = |belief: PlanBelief| (placement.error(&belief), belief.covers(placement.source, chance));
+    Ok(beliefs(&placement, truth)?.map(judge))
 }
 
 impl Figure for Ranks {

@@ -1,14 +1,12 @@
 //! A leak in a building: sensors of few bits, the true geometry, and free space.
 
-use super::building::{Building, CELL, Case, Placement};
+use super::building::{Building, CELL, Case, NEAR, Placement};
 use super::common::{fraction, median};
 use super::plan_belief::Report;
 use crate::prelude::*;
 
 /// Misfit above which a model is said to be wrong: one in a hundred, if it is right.
 const WRONG: f64 = 2.6;
-/// Mass of the credible regions.
-const CREDIBLE: f64 = 0.9;
 
 parameters! {
     pub struct Parameters {
@@ -85,8 +83,6 @@ struct Judged {
 
 /// The number of sensors after which errors are shown.
 const STOPS: [usize; 7] = [2, 5, 10, 20, 40, 80, 160];
-/// Two cells and a rounding.
-const TWO_CELLS: f64 = 2.0 * CELL + 1e-9;
 
 pub struct Rooms;
 
@@ -219,14 +215,12 @@ impl Figure for Rooms {
 /// What the true geometry and free space make of one placement.
 fn one(building: &Building, case: &Case, sensors: usize, stream: Stream) -> Result<[Judged; 2], Error> {
     let placement = Placement::draw(building, case, sensors, None, stream)?;
-    // The region of exactly nine tenths: the cell that would exceed it belongs to it by chance.
     let chance: f64 = stream.named("region").rng().random();
     let judge = |model| -> Result<Judged, Error> {
         let belief = placement.belief(model, sensors)?;
-        let [above, own] = belief.above(placement.source);
         Ok(Judged {
             error: placement.error(&belief),
-            covered: above + chance * own < CREDIBLE,
+            covered: belief.covers(placement.source, chance),
             alarm: belief.misfit > WRONG,
         })
     };
@@ -275,13 +269,13 @@ fn runs(
 
 fn summary(case: String, all: &[[Judged; 2]]) -> Found {
     let count = |holds: fn(&[Judged; 2]) -> bool| all.iter().filter(|result| holds(result)).count();
-    let misses = count(|[_, free]| free.error > TWO_CELLS);
+    let misses = count(|[_, free]| free.error > NEAR);
     Found {
         case,
-        within_two_cells: fraction(count(|[own, _]| own.error <= TWO_CELLS), all.len()),
+        within_two_cells: fraction(count(|[own, _]| own.error <= NEAR), all.len()),
         coverage: fraction(count(|[own, _]| own.covered), all.len()),
         false_alarms: fraction(count(|[own, _]| own.alarm), all.len()),
-        free_within_two_cells: fraction(count(|[_, free]| free.error <= TWO_CELLS), all.len()),
-        free_misses_flagged: fraction(count(|[_, free]| free.error > TWO_CELLS && free.alarm), misses),
+        free_within_two_cells: fraction(count(|[_, free]| free.error <= NEAR), all.len()),
+        free_misses_flagged: fraction(count(|[_, free]| free.error > NEAR && free.alarm), misses),
     }
 }

@@ -24,10 +24,6 @@ rows! {
 
 pub struct Fig2;
 
-fn at(rows: &[Row], ratio: f64, t: u32) -> Option<&Row> {
-    rows.iter().find(|r| r.ratio == ratio && r.t == t)
-}
-
 impl Figure for Fig2 {
     figure!(Parameters => Vec<Row>, "handoff-fig2", "Small losses add up to more than their sum", "compressed particle filter, Section 4, Figure 2",
         "A Gaussian that is narrowed a little at every step. Each step loses under 0.001 nat at ratio 0.97, ten steps \
@@ -55,14 +51,14 @@ impl Figure for Fig2 {
     fn claims(&self, p: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let here = claims.at_defaults();
         let what = "at ratio 0.97 a step loses less than 0.001 nat";
-        here.below("step", what, at(rows, 0.97, 1).map(|r| r.kl_step), 1e-3);
-        here.above("ten-steps", "and ten steps more than 0.1 nat", at(rows, 0.97, 10).map(|r| r.kl_total), 0.1);
+        here.below("step", what, find(rows, "r0.97-t1").map(|r| r.kl_step), 1e-3);
+        here.above("ten-steps", "and ten steps more than 0.1 nat", find(rows, "r0.97-t10").map(|r| r.kl_total), 0.1);
         let what = "while the ten steps' own losses sum to less than 0.01 nat";
-        here.below("sum", what, at(rows, 0.97, 10).map(|r| r.sum_of_steps), 1e-2);
+        here.below("sum", what, find(rows, "r0.97-t10").map(|r| r.sum_of_steps), 1e-2);
         let what = "at the printed ratio 0.96 a step loses more than the printed 0.001 nat (erratum handoff-1)";
-        here.above("printed-ratio", what, at(rows, 0.96, 1).map(|r| r.kl_step), 1e-3);
+        here.above("printed-ratio", what, find(rows, "r0.96-t1").map(|r| r.kl_step), 1e-3);
         let what = "the other way round even 0.97 stays below 0.1 nat after ten steps";
-        here.below("reverse", what, at(rows, 0.97, 10).map(|r| r.kl_total_reverse), 0.1);
+        here.below("reverse", what, find(rows, "r0.97-t10").map(|r| r.kl_total_reverse), 0.1);
         for ratio in p.ratio.iter().filter(|r| **r < 1.0) {
             let gaps = select(rows, |r| r.ratio == *ratio && r.t > 0).map(|r| r.kl_total / r.sum_of_steps);
             let what = "the ratio of the whole to the sum of its parts grows with time";

@@ -21,11 +21,11 @@ parameters! {
 
 rows! {
     pub struct Row by "{method}-t{t}" at full_trials {
-        t: usize => "Time.",
+        t: usize as x("hand-overs t") => "Time.",
         /// What is handed on: a cut by ml, kl or l1; the estimate (kde_only); particles (raw_pf); one Gaussian (gauss).
-        method: &'static str,
+        method: &'static str as key,
         /// KL from one reference filter to the method, less that to the other reference filter.
-        kl_increase: Measured ["nat"],
+        kl_increase: Measured ["nat"] as curve in error,
         median: f64 ["nat"] => "Median over worlds.",
         before_reduction: Option<Measured> ["nat"] => "The same before the step's own reduction.",
     }
@@ -38,9 +38,9 @@ rows! {
     }
 
     struct Unamplified {
-        t: usize => "Time.",
+        t: usize as x("hand-overs t") => "Time.",
         /// Sum of the KL errors of all hand-overs (KL-optimised): the printed KL bound if nothing were amplified.
-        kl_sum: Measured ["nat"],
+        kl_sum: Measured ["nat"] as dashed("KL bound, not amplified") in error,
         /// Twice the sum of the ML errors (ML-optimised): the printed ML bound, which bounds the KL as well.
         ml_bound: Measured ["nat"],
     }
@@ -55,14 +55,13 @@ rows! {
 /// What is made of an estimate of so many components, if anything.
 type Reduce = fn(&KernelEstimate<2>, usize) -> Result<Mixture<2>, Error>;
 
-/// Names in the table and in the picture.
-const METHODS: [(&str, &str, Option<Reduce>); 6] = [
-    ("ml", "ML", Some(|estimate, components| paper_cut(estimate, 0, components))),
-    ("kl", "KL", Some(|estimate, components| paper_cut(estimate, 1, components))),
-    ("l1", "L1", Some(|estimate, components| paper_cut(estimate, 2, components))),
-    ("kde_only", "no reduction", None),
-    ("raw_pf", "particles, no kernel", None),
-    ("gauss", "one Gaussian", Some(|estimate, _| single(estimate))),
+const METHODS: [(&str, Option<Reduce>); 6] = [
+    ("ml", Some(|estimate, components| paper_cut(estimate, 0, components))),
+    ("kl", Some(|estimate, components| paper_cut(estimate, 1, components))),
+    ("l1", Some(|estimate, components| paper_cut(estimate, 2, components))),
+    ("kde_only", None),
+    ("raw_pf", None),
+    ("gauss", Some(|estimate, _| single(estimate))),
 ];
 
 /// One filter under test: what it knows.
@@ -91,7 +90,7 @@ fn trial(p: &Parameters, it: Trial) -> Result<Vec<Moment>, Error> {
     let mut a = prior()?.sample_systematic(&mut rng_a, REFERENCE)?;
     let mut b = prior()?.sample_systematic(&mut rng_b, REFERENCE)?;
     let mut filters = Vec::new();
-    for (method, ..) in METHODS {
+    for (method, _) in METHODS {
         let (mut own, start) = (rng(method), prior()?);
         let known = match method {
             "raw_pf" => Known::Particles(start.sample_systematic(&mut own, PARTICLES)?),
@@ -124,7 +123,7 @@ fn trial(p: &Parameters, it: Trial) -> Result<Vec<Moment>, Error> {
             at.before[m] = base - mean_log(&|x, out| estimate.log_pdf_columns(x, out));
             at.after[m] = at.before[m];
             let mut sent = None;
-            if let Some(reduce) = METHODS[m].2 {
+            if let Some(reduce) = METHODS[m].1 {
                 let mixture = sent.insert(reduce(&estimate, p.components)?);
                 at.after[m] = base - mean_log(&|x, out| mixture.log_pdf_columns(x, out));
                 match m {
@@ -153,7 +152,8 @@ impl Rows {
 impl Figure for Fig6c {
     figure!(Parameters => Rows, "handoff-fig6c", "The actual error", "compressed particle filter, Section 6, Figure 6(c)",
         "KL from a reference filter of 2000 particles, less that to an independent copy of it, in 150 worlds. The three criteria are \
-         close, ML a little behind; all are far below their bounds, and a single Gaussian is far behind.");
+         close, ML a little behind; all are far below their bounds, and a single Gaussian is far behind.";
+        { error: linear("KL increase / nat", "Five components") });
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let runs = context.trials(context.stream("handoff-fig6c"), p.trials, |it| trial(p, it))?;
@@ -161,7 +161,7 @@ impl Figure for Fig6c {
         for t in 1..=STEPS {
             let after = |m: usize| runs.iter().map(move |run| run[t - 1].after[m]);
             let before = |m: usize| runs.iter().map(move |run| run[t - 1].before[m]);
-            for (m, (method, ..)) in METHODS.into_iter().enumerate() {
+            for (m, (method, _)) in METHODS.into_iter().enumerate() {
                 rows.error.push(Row {
                     t,
                     method,
@@ -193,7 +193,7 @@ impl Figure for Fig6c {
         here.all("kl-l1", what, pair("kl-l1"), |d| d.kl.value.abs() < 0.015 + 3.0 * d.kl.error());
         let worst = (1..=STEPS).filter_map(|t| {
             let gauss = rows.at(t, "gauss")?.value;
-            let better = |(method, ..): &(&str, _, _)| rows.at(t, method).is_some_and(|v| v.value < gauss);
+            let better = |(method, _): &(&str, _)| rows.at(t, method).is_some_and(|v| v.value < gauss);
             Some(METHODS[..5].iter().all(better))
         });
         paper.all("gauss-worst", "one Gaussian is worst at every time", worst, |w| w);
@@ -210,19 +210,5 @@ impl Figure for Fig6c {
         let what = "smoothing, not reduction, makes most of the error: the estimate alone is above 0.7 of KL";
         let share = over(rows.at(10, "kde_only"), rows.at(10, "kl"));
         paper.above("smoothing", what, share, 0.7);
-    }
-
-    fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let of = |method: &'static str| select(&rows.error, move |r| r.method == method);
-        let each = || METHODS.iter().enumerate();
-        let place = |r: &Row| (r.t as f64, r.kl_increase);
-        let layers = each().map(|(i, (method, label, _))| Layer::measured(*label, of(method), place).coloured(i));
-        let lines = each().map(|(i, (method, ..))| Layer::line("", points(of(method), place)).coloured(i));
-        let sums = points(&rows.bounds, |b| (b.t as f64, b.kl_sum.value));
-        let panel = Panel::linear("Five components", "hand-overs t", "KL increase / nat")
-            .with_all(lines)
-            .with_all(layers)
-            .with(Layer::dashed("KL bound, not amplified", sums).coloured(6));
-        Plot::of(panel)
     }
 }

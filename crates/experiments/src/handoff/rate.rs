@@ -35,10 +35,6 @@ fn name(row: &Row) -> String {
     format!("{}-{}{resolution}", row.message, row.size)
 }
 
-fn find<'a>(rows: &'a [Row], message: &str, size: usize, resolution: Option<f64>) -> Option<&'a Row> {
-    first(rows, |r| r.message == message && r.size == size && r.resolution == resolution)
-}
-
 impl Figure for Rate {
     figure!(Parameters => Vec<Row>, "handoff-rate", "What bits buy", "our own comparison",
         "KL from the estimate to what the receiver decodes against the length of the message. Coded mixtures need a \
@@ -87,18 +83,18 @@ impl Figure for Rate {
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let (here, paper) = (claims.at_defaults(), claims.at_defaults().at_full_trials());
-        let bits = |message: &str, size, step| find(rows, message, size, step).map(|r| r.bits);
-        let kl = |message: &str, size, step| find(rows, message, size, step).map(|r| r.kl);
-        let share = over(bits("coded", 5, Some(0.25)), bits("f32", 5, None));
+        let bits = |message: &str| find(rows, message).map(|r| r.bits);
+        let kl = |message: &str| find(rows, message).map(|r| r.kl);
+        let share = over(bits("coded-5-r0.25"), bits("f32-5"));
         here.at_most("sixth", "five coded components take at most a sixth of the bits of floats", share, 1.0 / 6.0);
-        let share = over(bits("coded", 10, Some(0.15)), bits("particles", 500, None));
+        let share = over(bits("coded-10-r0.15"), bits("particles-500"));
         here.at_most("hundredth", "ten take at most a hundredth of the bits of 500 particles", share, 0.01);
-        let gap = minus(kl("coded", 10, Some(0.15)), kl("particles", 100, None));
+        let gap = minus(kl("coded-10-r0.15"), kl("particles-100"));
         paper.below("particles", "and lose less than 100 particles", gap, 0.0);
         for m in [3, 5, 10] {
-            let by = [0.35, 0.25, 0.15].map(|r| kl("coded", m, Some(r)).map(|kl| kl.value));
-            paper.decreasing(format!("finer-m{m}"), "finer steps lose less", by);
-            let gap = minus(kl("coded", m, Some(0.15)), kl("coded-kd", m, Some(0.15)));
+            let by = [0.35, 0.25, 0.15].map(|r| kl(&format!("coded-{m}-r{r}")));
+            paper.decreasing(format!("finer-m{m}"), "finer steps lose less", by.map(|kl| kl.map(|kl| kl.value)));
+            let gap = minus(by[2], kl(&format!("coded-kd-{m}-r0.15")));
             let what = "at the same bits the pipeline loses less than the paper's cut";
             paper.below(format!("pipeline-m{m}"), what, gap, 0.0);
         }

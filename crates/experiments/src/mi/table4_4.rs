@@ -28,11 +28,11 @@ rows! {
     }
 
     struct Design by "{signal} {method}" {
-        signal: f64 ["noise sd"] => "The value to tell from 0.",
-        method: &'static str => "What the quantizer maximises (pe: minimises the error itself).",
-        t: f64 ["noise sd"] => "Offset of the outer breakpoints (of the first sensor).",
+        signal: f64 ["noise sd"] as panel("signal of {} noise deviations") => "The value to tell from 0.",
+        method: &'static str as key => "What the quantizer maximises (pe: minimises the error itself).",
+        t: f64 ["noise sd"] as x("offset t / noise deviations") => "Offset of the outer breakpoints (of the first sensor).",
         offsets: String ["noise sd"] => "Offsets of all sensors, where they differ.",
-        pe: f64 => "Bayes error at equal priors.",
+        pe: f64 as points in error => "Bayes error at equal priors.",
         printed_pe: Option<f64> => "The publication's value.",
         mi_nats: f64 ["nat"] => "Mutual information.",
         equivocation_nats: f64 ["nat"] => "ln 2 minus it, without cancellation.",
@@ -43,9 +43,9 @@ rows! {
     }
 
     struct Point {
-        signal: f64 ["noise sd"] => "The value to tell from 0.",
-        t: f64 ["noise sd"] => "Common offset.",
-        pe: f64 => "Bayes error.",
+        signal: f64 ["noise sd"] as panel("signal of {} noise deviations") => "The value to tell from 0.",
+        t: f64 ["noise sd"] as x("offset t / noise deviations") => "Common offset.",
+        pe: f64 as line("identical quantizers") in error => "Bayes error.",
     }
 
     struct Check by "{signal}" {
@@ -101,7 +101,7 @@ impl Figure for Table44 {
     figure!(Parameters => Rows, "mi-table4-4", "Detection by five sensors", "thesis, Table 4.4",
         "Error probability of the optimal decision between 0 and a signal from five sensors of four levels, exact by \
          counting. Mutual information and the Matusita distance give almost the least error; the J-divergence is \
-         far off at the strong signal.");
+         far off at the strong signal."; { error: semilog("error probability") });
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let mut rows = Rows::default();
@@ -172,27 +172,5 @@ impl Figure for Table44 {
         let what =
             "the printed 1.0e-5 at the strong signal is below the best that any design found reaches (erratum mi-11)";
         here.above("too-low", what, pe(4.0, "pe").map(|pe| pe - 1.0e-5), 0.0);
-    }
-
-    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
-        let methods = [
-            ("mi-joint", "information, all sensors"),
-            ("mi-single", "information, one sensor"),
-            ("matusita", "Matusita distance"),
-            ("j-divergence", "J-divergence"),
-            ("pe", "least error"),
-        ];
-        let panel = |&signal: &f64| {
-            let designs = methods.iter().enumerate().map(|(i, (method, label))| {
-                let own = select(&rows.designs, |d| d.signal == signal && d.method == *method);
-                Layer::points(*label, points(own, |d| (d.t, d.pe))).coloured(i)
-            });
-            let curve = points(select(&rows.curve, |r| r.signal == signal), |r| (r.t, r.pe));
-            let title = format!("Signal of {signal} noise deviations");
-            Panel::semilog(title, "offset t / noise deviations", "error probability")
-                .with(Layer::line("identical quantizers", curve).coloured(6))
-                .with_all(designs)
-        };
-        Plot::grid(2, p.signals.iter().map(panel).collect())
     }
 }

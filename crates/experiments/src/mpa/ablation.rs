@@ -1,7 +1,6 @@
 //! `mpa-ablation`: improved message passing with one erratum put back at a time.
 
 use super::scores::{self, Row, ladder, mse};
-use super::sweeps::SPEED;
 use super::world::{Method, Point};
 use crate::prelude::*;
 use fewbits_baselines::pf_mpa::IntervalRule;
@@ -52,15 +51,11 @@ impl Figure for Ablation {
         let mut rows = Vec::new();
         for snr in [50.0, 30.0] {
             for (name, messages, interval) in variants(p.particles)? {
-                let point = Point {
-                    interval,
-                    ..Point::published(snr, 4, SPEED)?
-                };
-                let method = [(Method::Messages(messages), p.trials)];
-                for row in scores::rows(context, &format!("{snr}dB"), &point, &method)? {
-                    let method = name.to_owned();
-                    rows.push(Row { method, ..row });
-                }
+                let mut point = Point::published(snr, 4)?;
+                (point.name, point.interval) = (format!("{snr}dB"), interval);
+                let mut own = scores::rows(context, &point, &[(Method::Messages(messages), p.trials)])?;
+                own.iter_mut().for_each(|row| row.method = name.to_owned());
+                rows.extend(own);
             }
         }
         Ok(rows)
@@ -68,7 +63,7 @@ impl Figure for Ablation {
 
     fn claims(&self, _: &Parameters, t: &Vec<Row>, claims: &mut Claims) {
         let paper = claims.at_defaults().at_full_trials();
-        let ratio = |name: &str| Some(mse(t, "50dB", name)? / mse(t, "50dB", "improved")?);
+        let ratio = |name: &str| over(mse(t, &format!("50dB {name}")), mse(t, "50dB improved"));
         let what = "transferring velocities costs half as much again (erratum mpa-7)";
         paper.above("transfer", what, ratio("transfer"), 1.25);
         paper.above("full-ring", "a full ring loses what its kernel cannot hold", ratio("full ring"), 4.0);

@@ -1,6 +1,5 @@
 //! `mpa-crlb`: posterior Cramer-Rao bounds and what trackers reach on free trajectories.
 
-use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, Score, World, prior};
 use crate::prelude::*;
 use fewbits_baselines::pf_mpa::{CramerRao, Target, position_information};
@@ -46,7 +45,7 @@ impl Figure for Bounds {
         let mut bounds = Vec::new();
         for snr_db in SNRS {
             for levels in LEVELS {
-                let network = Point::published(snr_db, levels, SPEED)?.network()?;
+                let network = Point::published(snr_db, levels)?.network()?;
                 let one = |trial: Trial| -> Result<([f64; 3], Sums), Error> {
                     let world = World::draw(trial.stream, &target, Field::Free)?;
                     let run = |method: Method| method.run(&world, &network, &target, trial.stream);

@@ -1,8 +1,7 @@
 //! `mpa-encoder`: the published reference, the predicted one, and cells that adapt to what is known.
 
-use super::scores::{Row, find, mse, rows};
-use super::sweeps::SPEED;
-use super::world::{Method, Point};
+use super::scores::{Row, mse, rows};
+use super::world::{Method, Point, SPEED};
 use crate::prelude::*;
 use fewbits_baselines::pf_mpa::Encoder;
 
@@ -33,9 +32,14 @@ impl Figure for Encoders {
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let methods = [Method::Grid(15), Method::GMPA, Method::EKF_U].map(|m| (m, p.trials));
         let guided = [Method::Guided(10), Method::Guided(40)].map(|m| (m, p.trials));
-        let at = |snr, levels, encoder| {
-            let published = Point::published(snr, levels, SPEED)?;
-            Ok::<_, Error>(Point { encoder, ..published })
+        let at = |kind: &str, snr, levels, encoder| {
+            let published = Point::published(snr, levels)?;
+            let name = format!("{kind} {}", published.name);
+            Ok::<_, Error>(Point {
+                name,
+                encoder,
+                ..published
+            })
         };
         let (mut encoders, mut loadings) = (Vec::new(), Vec::new());
         for snr in [50.0, 40.0, 30.0] {
@@ -46,8 +50,7 @@ impl Figure for Encoders {
                     Encoder::adaptive(levels)?,
                 ];
                 for (name, encoder) in NAMES.into_iter().zip(all) {
-                    let point = at(snr, levels, encoder)?;
-                    encoders.extend(rows(context, &format!("{name} {snr}dB-L{levels}"), &point, &methods)?);
+                    encoders.extend(rows(context, &at(name, snr, levels, encoder)?, &methods)?);
                 }
             }
         }
@@ -57,26 +60,24 @@ impl Figure for Encoders {
             (50.0, 8, &[1.8, 3.0, 4.0]),
         ] {
             for &loading in list {
-                let point = at(snr, levels, Encoder::Adaptive { loading })?;
-                loadings.extend(rows(context, &format!("{loading} {snr}dB-L{levels}"), &point, &methods[..1])?);
+                let point = at(&loading.to_string(), snr, levels, Encoder::Adaptive { loading })?;
+                loadings.extend(rows(context, &point, &methods[..1])?);
             }
-            let point = at(snr, levels, Encoder::adaptive(levels)?)?;
-            loadings.extend(rows(context, &format!("best {snr}dB-L{levels}"), &point, &guided)?);
+            loadings.extend(rows(context, &at("best", snr, levels, Encoder::adaptive(levels)?)?, &guided)?);
         }
         Ok(Rows { encoders, loadings })
     }
 
     fn claims(&self, _: &Parameters, t: &Rows, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        let grid = |name: &str, point: &str| mse(&t.encoders, &format!("{name} {point}"), "grid-15");
+        let grid = |name: &str, point: &str| mse(&t.encoders, &format!("{name} {point} grid-15"));
         for (point, factor) in [("50dB-L4", 20.0), ("40dB-L4", 8.0), ("30dB-L4", 2.4)] {
             let gain = over(grid("published", point), grid("adaptive", point));
             let what = "the adaptive encoder divides the error (erratum mpa-2)";
             full.at_least(format!("gain-{point}"), what, gain, factor);
         }
         for snr in ["50dB", "40dB", "30dB"] {
-            let point = format!("{snr}-L16");
-            let of = |method: &str| find(&t.encoders, &format!("adaptive {point}"), method).map(|r| r.score.mse);
+            let of = |method: &str| find(&t.encoders, &format!("adaptive {snr}-L16 {method}")).map(|r| r.score.mse);
             // The error of the extended filter has a heavy tail at 50 dB: 8 % standard error in 200 tracks.
             let ratio = of("grid-15").zip(of("EKF-U")).map(|(a, b)| {
                 let relative = |m: Measured| m.error() / m.value;

@@ -1,6 +1,5 @@
 //! `mpa-fig3-3`: one trajectory.
 
-use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, World, canonical};
 use crate::prelude::*;
 use fewbits_baselines::pf_mpa::Target;
@@ -41,7 +40,7 @@ impl Figure for Fig33 {
          as published wander off; the grid filter stays on the track.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
-        let (target, point) = (Target::printed()?, Point::published(p.snr_db, p.levels, SPEED)?);
+        let (target, point) = (Target::printed()?, Point::published(p.snr_db, p.levels)?);
         let network = point.network()?;
         let stream = context.stream("mpa-trajectories").indexed(p.trajectory);
         let world = World::draw(stream, &target, Field::Confined)?;

@@ -1,6 +1,5 @@
 //! `mpa-leader`: every sensor runs message passing with its own seed; who claims the lead?
 
-use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, World, canonical};
 use crate::prelude::*;
 use fewbits_baselines::pf_mpa::MessagePassing;
@@ -16,12 +15,12 @@ parameters! {
 
 rows! {
     pub struct Row by "{snr_db}dB-N{particles}" at full_trials {
-        snr_db: f64 ["dB"] => "Ratio of the powers of range and noise.",
-        particles: usize => "Particles.",
+        snr_db: f64 ["dB"] as x("SNR / dB, particles") => "Ratio of the powers of range and noise.",
+        particles: usize as x => "Particles.",
         one: Measured => "Share of steps with one claimant.",
-        none: Measured => "Share of steps with no claimant.",
-        several: Measured => "Share of steps with several claimants.",
-        nearest: Measured => "Share of steps in which the true nearest sensor leads.",
+        none: Measured as points("none claims") => "Share of steps with no claimant.",
+        several: Measured as points("several claim") => "Share of steps with several claimants.",
+        nearest: Measured as points("the nearest leads") => "Share of steps in which the true nearest sensor leads.",
         mse: Measured => "Mean squared position error of the leader's estimate.",
         spread: Measured => "Variance of the sensors' estimates about their mean, both axes.",
     }
@@ -35,12 +34,12 @@ impl Figure for Leaders {
     figure!(Parameters => Vec<Row>, "mpa-leader", "Elections among copies that drew for themselves", "particle message passing, Section 3.3",
         "Five sensors, each with its own message passing and its own seed; the leader's mean and covariance, rounded to \
          32 bits, are what all go on with. In 98 of 100 steps exactly one claims the lead. One shared seed, or a \
-         deterministic tracker, would make it all of them.");
+         deterministic tracker, would make it all of them."; linear("share of steps"));
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let (target, sensors) = (Target::printed()?, canonical());
         let row = |(snr_db, particles): (f64, usize)| -> Result<Row, Error> {
-            let network = Point::published(snr_db, 4, SPEED)?.network()?;
+            let network = Point::published(snr_db, 4)?.network()?;
             let tracker = MessagePassing::improved(particles)?;
             let one = |trial: Trial| {
                 let world = World::draw(trial.stream, &target, Field::Confined)?;
@@ -91,17 +90,5 @@ impl Figure for Leaders {
         claims.all("sum", "every step has one, none or several", t, |r| {
             (r.one.value + r.none.value + r.several.value - 1.0).abs() < 1e-9
         });
-    }
-
-    fn plot(&self, _: &Parameters, t: &Vec<Row>) -> Plot {
-        let names = t.iter().map(|r| format!("{} dB, N = {}", r.snr_db, r.particles));
-        let rows = || t.iter().enumerate();
-        let rest = |share: Measured| (share - 1.0).scaled(-1.0);
-        Plot::of(
-            Panel::new("Elections", Axis::categories("", names), Axis::linear("share of steps"))
-                .with(Layer::measured("none claims", rows(), |(i, r)| (i as f64, r.none)))
-                .with(Layer::measured("none or several claim", rows(), |(i, r)| (i as f64, rest(r.one))))
-                .with(Layer::measured("another than the nearest leads", rows(), |(i, r)| (i as f64, rest(r.nearest)))),
-        )
     }
 }

@@ -40,12 +40,7 @@ rows! {
 }
 
 /// Every method at a point, on the trajectories that all figures share: the first ones, as many as its count says.
-pub(super) fn rows(
-    context: &Context<'_>,
-    name: &str,
-    point: &Point,
-    methods: &[(Method, u64)],
-) -> Result<Vec<Row>, Error> {
+pub(super) fn rows(context: &Context<'_>, point: &Point, methods: &[(Method, u64)]) -> Result<Vec<Row>, Error> {
     let (network, target) = (point.network()?, Target::printed()?);
     let most = methods.iter().map(|m| m.1).max().unwrap_or(0);
     let all = context.trials(context.stream("mpa-trajectories"), most, |trial| {
@@ -58,7 +53,7 @@ pub(super) fn rows(
         methods.iter().map(error).collect::<Result<Vec<Option<f64>>, Error>>()
     })?;
     let row = |(m, (method, _)): (usize, &(Method, u64))| Row {
-        point: name.to_owned(),
+        point: point.name.clone(),
         snr_db: point.snr_db,
         levels: point.levels,
         method: method.name(),
@@ -72,14 +67,9 @@ pub(super) fn rows(
 /// The axis of squared position errors.
 pub(super) const MSE: &str = "mean squared error / m^2";
 
-/// The score of a method at a point.
-pub(super) fn find<'a>(rows: &'a [Row], point: &str, method: &str) -> Option<&'a Row> {
-    first(rows, |r| r.point == point && r.method == method)
-}
-
-/// Its mean squared error.
-pub(super) fn mse(rows: &[Row], point: &str, method: &str) -> Option<f64> {
-    find(rows, point, method).map(|r| r.score.mse.value)
+/// The mean squared error in the row of this name: of a tracker at a point.
+pub(super) fn mse(rows: &[Row], key: &str) -> Option<f64> {
+    find(rows, key).map(|r| r.score.mse.value)
 }
 
 /// Means and medians, a tracker a line.

@@ -1,12 +1,9 @@
 //! `mpa-table3-mse`, `mpa-fig3-4`, `mpa-fig3-5`, `mpa-table3-low`: all trackers over particles, levels and noise.
 
-use super::scores::{Effort, GAUSSIAN, MSE, Row, clouds, deterministic, find, ladder, messages, mse, rows};
-use super::world::{LAYOUTS, Method, Point};
+use super::scores::{Effort, GAUSSIAN, MSE, Row, clouds, deterministic, ladder, messages, mse, rows};
+use super::world::{Method, Point, layouts};
 use crate::prelude::*;
-use fewbits_baselines::pf_mpa::Reports;
-
-/// The speed of the canonical scenario.
-pub(super) const SPEED: f64 = 3.0;
+use fewbits_baselines::pf_mpa::{Encoder, Reports};
 
 pub struct Mse;
 
@@ -32,13 +29,14 @@ impl Figure for Mse {
         }
         methods.push(Method::improved(100)?);
         methods.extend(clouds(500));
-        let canonical = Point::published(50.0, 4, SPEED)?;
-        let trackers = rows(context, "50dB-L4", &canonical, &p.of(&methods))?;
-        let cheap = [&GAUSSIAN[..], &[Method::Guided(40)]].concat();
-        let (mut speeds, mut layouts, mut floor) = (Vec::new(), Vec::new(), Vec::new());
+        let canonical = Point::published(50.0, 4)?;
+        let trackers = rows(context, &canonical, &p.of(&methods))?;
+        let cheap = p.of(&[&GAUSSIAN[..], &[Method::Guided(40)]].concat());
+        let (mut speeds, mut others, mut floor) = (Vec::new(), Vec::new(), Vec::new());
         for speed in [1.0, 1.5, 2.0, 3.0, 4.0] {
-            let point = Point::published(50.0, 4, speed)?;
-            speeds.extend(rows(context, &format!("V{speed}"), &point, &p.of(&cheap))?);
+            let mut point = canonical.clone();
+            (point.name, point.encoder) = (format!("V{speed}"), Encoder::published(speed)?);
+            speeds.extend(rows(context, &point, &cheap)?);
         }
         let mut some = deterministic(&[9, 15]);
         for n in [10, 40] {
@@ -49,12 +47,10 @@ impl Figure for Mse {
             trials: p.trials.min(100),
             message_trials: p.message_trials.min(25),
         };
-        for (i, sensors) in LAYOUTS.iter().enumerate() {
-            let point = Point {
-                sensors: sensors.iter().map(|s| Vector2::from(*s)).collect(),
-                ..canonical.clone()
-            };
-            layouts.extend(rows(context, &format!("layout{i}"), &point, &effort.of(&some))?);
+        for (i, sensors) in layouts()?.into_iter().enumerate() {
+            let mut point = canonical.clone();
+            (point.name, point.sensors) = (format!("layout{i}"), sensors);
+            others.extend(rows(context, &point, &effort.of(&some))?);
         }
         let large = [
             Method::Bootstrap(4000, Reports::Levels),
@@ -63,13 +59,12 @@ impl Figure for Mse {
             Method::GMPA,
         ];
         for snr in [50.0, 40.0, 30.0] {
-            let counted: Vec<(Method, u64)> = large.iter().map(|m| (*m, p.message_trials)).collect();
-            floor.extend(rows(context, &format!("{snr}dB-L4"), &Point::published(snr, 4, SPEED)?, &counted)?);
+            floor.extend(rows(context, &Point::published(snr, 4)?, &large.map(|m| (m, p.message_trials)))?);
         }
         Ok(Mses {
             trackers,
             speeds,
-            layouts,
+            layouts: others,
             floor,
         })
     }
@@ -77,7 +72,8 @@ impl Figure for Mse {
     fn claims(&self, _: &Effort, t: &Mses, claims: &mut Claims) {
         let full = claims.at_full_trials();
         full.keyed("floor-mse", "mean squared position error", &t.floor, |r| r.score.mse);
-        let value = |method: &str| mse(&t.trackers, "50dB-L4", method);
+        let of = |method: &str| find(&t.trackers, &format!("50dB-L4 {method}")).map(|r| &r.score);
+        let value = |method: &str| of(method).map(|score| score.mse.value);
         let order = ["grid-15", "guided-40", "GMPA", "GMPA-transfer"].map(value);
         let what =
             "grid < guided draws < Gaussian message passing < the same with transferred velocity (erratum mpa-10)";
@@ -85,24 +81,22 @@ impl Figure for Mse {
         let printed = ["improved-40", "GMPA-transfer", "EKF-Q-naive"].map(value);
         let what = "the printed order holds with the naive filter, transferred velocity and errata mended";
         full.increasing("printed-order", what, printed);
-        let median = |method: &str| find(&t.trackers, "50dB-L4", method).map(|r| r.score.median.value);
+        let median = |method: &str| of(method).map(|score| score.median.value);
         let what = "the naive filter's median, too, is above that with quantization noise";
         full.increasing("naive", what, ["EKF-Q", "EKF-Q-naive"].map(median));
-        let lost = find(&t.trackers, "50dB-L4", "published-40").map(|r| r.score.lost);
+        let lost = of("published-40").map(|score| score.lost);
         let what = "as printed, particle message passing loses the target in most tracks (erratum mpa-8)";
         full.at_least("published", what, lost, 0.7);
-        let layout = |i: u32, over: &str, under: &str| {
-            let at = |method| mse(&t.layouts, &format!("layout{i}"), method);
-            Some(at(over)? / at(under)?)
-        };
+        let layout = |i: u32, method: &str| mse(&t.layouts, &format!("layout{i} {method}"));
         let what = "the grid is below Gaussian message passing in all layouts";
-        full.all("layouts-grid", what, 0..4, |i| layout(i, "grid-15", "GMPA").is_some_and(|r| r < 1.0));
+        full.all("layouts-grid", what, 0..4, |i| {
+            over(layout(i, "grid-15"), layout(i, "GMPA")).is_some_and(|r| r < 1.0)
+        });
         let what = "improved message passing is at most 1.15 of Gaussian with transfer, in other layouts";
         full.all("layouts-improved", what, 0..4, |i| {
-            layout(i, "improved-40", "GMPA-transfer").is_some_and(|r| r <= 1.15)
+            over(layout(i, "improved-40"), layout(i, "GMPA-transfer")).is_some_and(|r| r <= 1.15)
         });
-        let gmpa = |speed: &str| mse(&t.speeds, speed, "GMPA");
-        let growth = over(gmpa("V4"), gmpa("V1.5"));
+        let growth = over(mse(&t.speeds, "V4 GMPA"), mse(&t.speeds, "V1.5 GMPA"));
         let what = "the error grows with the square of the speed: a ratio 7.1 of squares gives 5.7";
         full.near("speed", what, growth, 5.7, 0.8);
     }
@@ -154,8 +148,7 @@ impl Figure for Fig34 {
                 _ => methods.extend(messages(n)?),
             }
         }
-        let point = Point::published(40.0, 4, SPEED)?;
-        rows(context, "40dB-L4", &point, &p.of(&methods))
+        rows(context, &Point::published(40.0, 4)?, &p.of(&methods))
     }
 
     fn claims(&self, _: &Effort, t: &Vec<Row>, claims: &mut Claims) {
@@ -163,15 +156,15 @@ impl Figure for Fig34 {
         // Of three particles the other program loses more tracks.
         full.no_more()
             .keyed("lost-most", "share of lost tracks", t, |r| r.score.lost);
-        let value = |method: String| mse(t, "40dB-L4", &method);
-        let improved = [10, 20, 40, 100].map(|n| value(format!("improved-{n}")));
+        let value = |method: &str| mse(t, &format!("40dB-L4 {method}"));
+        let improved = [10, 20, 40, 100].map(|n| value(&format!("improved-{n}")));
         full.decreasing("improved", "improved message passing gains from particles up to 100", improved);
-        full.above("few", "with three particles it loses the target (erratum mpa-9)", value("improved-3".into()), 4.0);
-        let guided = [3, 10, 40, 500].map(|n| value(format!("guided-{n}")));
+        full.above("few", "with three particles it loses the target (erratum mpa-9)", value("improved-3"), 4.0);
+        let guided = [3, 10, 40, 500].map(|n| value(&format!("guided-{n}")));
         full.decreasing("guided", "guided draws gain, too", guided);
-        let enough = over(value("guided-10".into()), value("guided-500".into()));
+        let enough = over(value("guided-10"), value("guided-500"));
         full.at_most("ten", "ten draws are enough for a guided filter: 1.6 of the error of 500", enough, 1.75);
-        let gap = over(value("grid-31".into()), value("EKF-U".into()));
+        let gap = over(value("grid-31"), value("EKF-U"));
         full.above("gap", "the gap to unquantized ranges never closes with four levels", gap, 10.0);
     }
 
@@ -185,7 +178,7 @@ impl Figure for Fig34 {
             "rao-blackwell",
         ];
         let size = |r: &Row| r.size.unwrap_or(1) as f64;
-        let level = |label, method| Layer::level(label, [3.0, 500.0], mse(t, "40dB-L4", method));
+        let level = |label, method| Layer::level(label, [3.0, 500.0], mse(t, &format!("40dB-L4 {method}")));
         let particles = Axis::log("particles").named(SIZES.map(|n| (n as f64, n.to_string())));
         Plot::of(
             Panel::new("40 dB, four levels", particles, Axis::log(MSE))
@@ -218,8 +211,7 @@ impl Figure for Fig35 {
         methods.extend(messages(40)?);
         let mut trackers = Vec::new();
         for levels in LEVELS {
-            let point = Point::published(50.0, levels, SPEED)?;
-            trackers.extend(rows(context, &format!("50dB-L{levels}"), &point, &p.of(&methods))?);
+            trackers.extend(rows(context, &Point::published(50.0, levels)?, &p.of(&methods))?);
         }
         Ok(trackers)
     }
@@ -230,18 +222,16 @@ impl Figure for Fig35 {
             ("improved-40", "improved message passing"),
             ("GMPA", "Gaussian message passing"),
         ] {
-            let values = LEVELS.map(|l| mse(t, &format!("50dB-L{l}"), method));
+            let values = LEVELS.map(|l| mse(t, &format!("50dB-L{l} {method}")));
             full.decreasing(format!("levels-{method}"), format!("more levels, less error: {what}"), values);
         }
-        let of = |levels: usize, method: &str| find(t, &format!("50dB-L{levels}"), method);
-        let ratio = |a: Option<&Row>, b: Option<&Row>| Some(a?.score.mse.value / b?.score.mse.value);
-        let slope = ratio(of(4, "GMPA"), of(64, "GMPA")).map(|ratio| ratio.powf(0.25));
+        let slope = over(mse(t, "50dB-L4 GMPA"), mse(t, "50dB-L64 GMPA")).map(|ratio| ratio.powf(0.25));
         full.near("slope", "a bit is worth a factor of about four", slope, 3.4, 0.6);
         let what = "four bits are not nearly unquantized with the published encoder (erratum mpa-13)";
-        full.above("four-bits", what, ratio(of(16, "improved-40"), of(16, "EKF-U")), 5.0);
-        let median = |levels: usize, method: &str| of(levels, method).map(|r| r.score.median.value);
+        full.above("four-bits", what, over(mse(t, "50dB-L16 improved-40"), mse(t, "50dB-L16 EKF-U")), 5.0);
+        let median = ["EKF-U", "improved-40"].map(|method| find(t, &format!("50dB-L256 {method}")));
         let what = "with eight bits, in the median, still above the unquantized filter";
-        full.increasing("eight-bits", what, [median(256, "EKF-U"), median(256, "improved-40")]);
+        full.increasing("eight-bits", what, median.map(|r| r.map(|r| r.score.median.value)));
     }
 
     fn plot(&self, _: &Effort, t: &Vec<Row>) -> Plot {
@@ -273,11 +263,10 @@ impl Figure for Low {
                 methods.extend(messages(n)?);
             }
             methods.extend(clouds(500));
-            trackers.extend(rows(context, &format!("{snr}dB-L4"), &Point::published(snr, 4, SPEED)?, &p.of(&methods))?);
+            trackers.extend(rows(context, &Point::published(snr, 4)?, &p.of(&methods))?);
             let cheap = [&GAUSSIAN[..], &[Method::Guided(40)]].concat();
             for levels in [8, 16, 64] {
-                let point = Point::published(snr, levels, SPEED)?;
-                trackers.extend(rows(context, &format!("{snr}dB-L{levels}"), &point, &p.of(&cheap))?);
+                trackers.extend(rows(context, &Point::published(snr, levels)?, &p.of(&cheap))?);
             }
         }
         Ok(trackers)
@@ -288,11 +277,11 @@ impl Figure for Low {
         // Of three particles the other program loses more tracks.
         full.no_more()
             .keyed("lost-most", "share of lost tracks", t, |r| r.score.lost);
-        let gmpa = |snr: u32, levels: usize| mse(t, &format!("{snr}dB-L{levels}"), "GMPA");
+        let gmpa = |snr: u32, levels: usize| mse(t, &format!("{snr}dB-L{levels} GMPA"));
         full.decreasing("30dB", "at 30 dB more levels help (erratum mpa-15)", [4, 8, 16, 64].map(|l| gmpa(30, l)));
-        let saturated = [16, 64].map(|l| Some(gmpa(20, l)? / gmpa(20, 8)?));
+        let saturated = [16, 64].map(|l| over(gmpa(20, l), gmpa(20, 8)));
         let what = "at 30 dB the unquantized filter is far below the printed .330, which fits 20 dB (erratum mpa-14)";
-        full.below("unit", what, mse(t, "30dB-L4", "EKF-U"), 0.2);
+        full.below("unit", what, mse(t, "30dB-L4 EKF-U"), 0.2);
         full.all("20dB", "at 20 dB nothing is gained beyond eight levels", saturated, |r| r.is_some_and(|r| r > 0.85));
     }
 

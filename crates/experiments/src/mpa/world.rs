@@ -27,36 +27,15 @@ pub(super) fn canonical() -> Vec<Vector2<f64>> {
 }
 
 /// Four further layouts, drawn once uniformly over the field by the program that made the references.
-pub(super) const LAYOUTS: [[[f64; 2]; SENSORS]; 4] = [
-    [
-        [3.314263649845593, 9.98700152392207],
-        [11.82697043722044, 1.516402150695002],
-        [3.662669522394207, 17.70779841328665],
-        [2.267570370775543, 3.335931089187364],
-        [18.06991215925195, 12.19390467033489],
-    ],
-    [
-        [7.641876227136238, 10.20502039245873],
-        [12.93117314530239, 5.955558683700327],
-        [3.483425311605196, 15.18471270107185],
-        [13.06649051384471, 10.22288164269689],
-        [15.70125584745385, 10.88335483966047],
-    ],
-    [
-        [18.6564455073515, 4.681170303940808],
-        [10.9671465315741, 9.705244544620978],
-        [7.358947391088066, 11.64871547108278],
-        [5.23542217001645, 15.4396483080127],
-        [16.61200393316346, 3.317674082101319],
-    ],
-    [
-        [9.40731772128888, 5.988608065606678],
-        [2.496105959234363, 17.12699754850662],
-        [8.739076456861037, 3.658443399317693],
-        [13.12052243096639, 4.639888500184687],
-        [17.22575941638718, 4.908668633533507],
-    ],
-];
+pub(super) fn layouts() -> Result<[Vec<Vector2<f64>>; 4], Error> {
+    let mut layouts = [const { Vec::new() }; 4];
+    let mut table = csv::Reader::from_reader(include_str!("../../references/mpa_layouts.csv").as_bytes());
+    for row in table.deserialize() {
+        let (layout, x, y): (usize, f64, f64) = row.map_err(Error::failed)?;
+        layouts[layout].push(Vector2::new(x, y));
+    }
+    Ok(layouts)
+}
 
 pub(super) fn prior() -> Result<Gaussian<4>, Error> {
     let covariance = Matrix4::from_diagonal(&Vector4::new(0.04, 0.04, 0.01, 0.01));
@@ -255,9 +234,14 @@ fn follow<B>(
     Ok(estimates)
 }
 
+/// The speed of the canonical scenario.
+pub(super) const SPEED: f64 = 3.0;
+
 /// Where a comparison is held.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Point {
+    /// What tables call it.
+    pub(super) name: String,
     pub(super) snr_db: f64,
     pub(super) levels: usize,
     pub(super) encoder: Encoder,
@@ -266,12 +250,13 @@ pub(super) struct Point {
 }
 
 impl Point {
-    /// The canonical sensors and the published encoder of the given speed.
-    pub(super) fn published(snr_db: f64, levels: usize, max_speed: f64) -> Result<Self, Error> {
+    /// The canonical sensors and the published encoder of the canonical speed, named after noise and levels.
+    pub(super) fn published(snr_db: f64, levels: usize) -> Result<Self, Error> {
         Ok(Self {
+            name: format!("{snr_db}dB-L{levels}"),
             snr_db,
             levels,
-            encoder: Encoder::published(max_speed)?,
+            encoder: Encoder::published(SPEED)?,
             sensors: canonical(),
             interval: IntervalRule::Correct,
         })

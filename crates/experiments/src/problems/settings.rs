@@ -94,8 +94,15 @@ impl<const D: usize, const K: usize> Problem<D, K> {
         }
         Ok(sum / run.len() as f64)
     }
+}
 
+/// A problem of any dimension.
+trait AnyProblem {
     /// Mean squared errors of all filters.
+    fn errors(&self, stream: Stream) -> Result<[f64; 5], Error>;
+}
+
+impl<const D: usize, const K: usize> AnyProblem for Problem<D, K> {
     fn errors(&self, stream: Stream) -> Result<[f64; 5], Error> {
         let run = self.draw(stream)?;
         let of = |name: &str| stream.named(name);
@@ -107,17 +114,6 @@ impl<const D: usize, const K: usize> Problem<D, K> {
             self.error(GridFilter::new(self.axes)?, &run, of("grid"))?,
             self.error(BootstrapFilter::new(ResamplingRule::default(), PARTICLES)?, &run, of("particles"))?,
         ])
-    }
-}
-
-/// A problem of any dimension.
-trait AnyProblem {
-    fn errors(&self, stream: Stream) -> Result<[f64; 5], Error>;
-}
-
-impl<const D: usize, const K: usize> AnyProblem for Problem<D, K> {
-    fn errors(&self, stream: Stream) -> Result<[f64; 5], Error> {
-        Problem::errors(self, stream)
     }
 }
 
