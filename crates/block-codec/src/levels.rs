@@ -9,13 +9,18 @@
 //! first number: its length in bits is that of the number of levels - 1   further numbers: as indices of other blocks
 //! ```
 //!
+//! With tables the arithmetic code has the list alone (from "number of levels" to "distances"). In front of it stands its length in bytes, a
+//! varint; behind it are the numbers of all rows as in module `tables`.
+//!
 //! A level is an index of the block's grid, or a sample itself; both are mapped to unsigned integers of the same order.
 
 use crate::arithmetic::{Coder, Reader, Writer};
+use crate::bytes::{Bytes, push_varint};
 use crate::counts::{Count, gamma};
 use crate::error::Damaged;
 use crate::indices::{Rest, code_rest};
 use crate::rows::Others;
+use crate::tables::{self, Plan};
 
 /// Probability, in units of `2^-16`, that numbers are coded by models.
 const BY_MODELS: u32 = 61_440;
@@ -53,14 +58,67 @@ pub(crate) fn levels(keys: &[u64]) -> Option<(Vec<u64>, Vec<i64>)> {
     let mut levels = keys.to_vec();
     levels.sort_unstable();
     levels.dedup();
-    let (first, last) = (*levels.first()?, *levels.last()?);
-    let is_dense = last - first < 2 * levels.len() as u64;
-    if levels.len() > most || is_dense {
+    if levels.len() > most || is_dense(&levels) {
         return None;
     }
     let number = |key: &u64| levels.binary_search(key).ok().map(|number| number as i64);
     let numbers = keys.iter().map(number).collect::<Option<_>>()?;
     Some((levels, numbers))
+}
+
+/// Largest number of levels that are numbered by [`few_levels`]; slots of its table.
+const FEW_LEVELS: usize = 4096;
+const SLOT_BITS: u32 = 13;
+const _: () = assert!(FEW_LEVELS < 1 << SLOT_BITS);
+/// Number of levels that any rows may have before they are too many for the rows so far.
+const FREE_LEVELS: usize = 128;
+
+/// As [`levels`] for a list that is short beside the rows, in one pass over these.
+pub(crate) fn few_levels(keys: impl ExactSizeIterator<Item = u64>) -> Option<(Vec<u64>, Vec<i64>)> {
+    let rows = keys.len();
+    // Number of the level from one on, in the order of the rows; zero is a free slot.
+    let mut slots = vec![0_u16; 1 << SLOT_BITS];
+    let (mut levels, mut numbers) = (Vec::new(), Vec::with_capacity(rows));
+    for (row, key) in keys.enumerate() {
+        // Multiplied by the golden ratio, whose high bits depend on all bits of the key.
+        let mut at = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (u64::BITS - SLOT_BITS)) as usize;
+        let number = loop {
+            match slots[at] {
+                0 => {
+                    if levels.len() >= (FREE_LEVELS + row / ROWS_PER_LEVEL).min(FEW_LEVELS) {
+                        return None;
+                    }
+                    levels.push(key);
+                    slots[at] = levels.len() as u16;
+                    break levels.len() as u16;
+                }
+                number if levels[usize::from(number) - 1] == key => break number,
+                _ => at = (at + 1) % slots.len(),
+            }
+        };
+        numbers.push(i64::from(number) - 1);
+    }
+    let mut order: Vec<usize> = (0..levels.len()).collect();
+    order.sort_unstable_by_key(|number| levels[*number]);
+    let sorted: Vec<u64> = order.iter().map(|number| levels[*number]).collect();
+    if levels.len() > rows / ROWS_PER_LEVEL || is_dense(&sorted) {
+        return None;
+    }
+    let mut ranks = vec![0; order.len()];
+    order
+        .iter()
+        .enumerate()
+        .for_each(|(rank, number)| ranks[*number] = rank as i64);
+    numbers.iter_mut().for_each(|number| *number = ranks[*number as usize]);
+    Some((sorted, numbers))
+}
+
+/// Whether at least every second key from the lowest to the highest is a level.
+fn is_dense(levels: &[u64]) -> bool {
+    match levels {
+        [first, .., last] => last - first < 2 * levels.len() as u64,
+        _ => true,
+    }
 }
 
 /// Codes the list of levels: `wanted` at the writer, `None` at the reader.
@@ -126,7 +184,11 @@ fn code<C: Coder>(
             .and_then(|number| levels.get(number).copied())
     };
     let levels = numbers.iter().map(level).collect::<Option<Vec<u64>>>();
-    levels.ok_or_else(|| Damaged::new("level", "beyond the last one", "one of the list"))
+    levels.ok_or_else(beyond_the_list)
+}
+
+fn beyond_the_list() -> Damaged {
+    Damaged::new("level", "beyond the last one", "one of the list")
 }
 
 /// Appends the code of keys with these levels to the head of a block.
@@ -139,6 +201,33 @@ pub(crate) fn write(
     let mut writer = Writer::new(head);
     code(&mut writer, by_models, Some(wanted), wanted.1.len(), others)?;
     Ok(writer.finish())
+}
+
+/// Appends the code of keys with these levels, and tables for their numbers, to the head of a block.
+pub(crate) fn write_tabled(
+    mut head: Vec<u8>,
+    (levels, numbers): &(Vec<u64>, Vec<i64>),
+    plan: &Plan,
+) -> Result<Vec<u8>, Damaged> {
+    let mut writer = Writer::default();
+    code_levels(&mut writer, Some(levels), numbers.len())?;
+    let list = writer.finish();
+    push_varint(&mut head, list.len() as u64);
+    head.extend_from_slice(&list);
+    tables::write(numbers, plan, head)
+}
+
+/// The keys of all rows of a block of [`write_tabled`].
+pub(crate) fn read_tabled(bytes: &[u8], rows: usize) -> Result<Vec<u64>, Damaged> {
+    let mut bytes = Bytes(bytes);
+    let length = bytes.count(usize::MAX, "length of levels")?;
+    let mut reader = Reader::new(bytes.take(length)?);
+    let levels = code_levels(&mut reader, None, rows)?;
+    reader.finish()?;
+    let numbers = tables::read(bytes.0, rows)?;
+    let level = |number: i64| usize::try_from(number).ok().and_then(|number| levels.get(number));
+    let levels = numbers.into_iter().map(|number| level(number).copied());
+    levels.collect::<Option<_>>().ok_or_else(beyond_the_list)
 }
 
 /// The keys of all rows.

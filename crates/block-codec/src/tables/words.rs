@@ -109,7 +109,8 @@ fn encode(step: u32, state: &mut u32, words: &mut Vec<u16>) {
     } else {
         let part = Part(step & (RAW - 1));
         let width = part.width();
-        if *state >= width << (u32::BITS - SLOT_BITS) {
+        // A part of all slots is reached by no state.
+        if u64::from(*state) >= u64::from(width) << (u32::BITS - SLOT_BITS) {
             words.push(*state as u16);
             *state >>= WORD_BITS;
         }
