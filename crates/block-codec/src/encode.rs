@@ -7,6 +7,7 @@ use crate::rows::Others;
 use crate::tables::TABLES_ROWS;
 use crate::vectors::vectorised;
 use crate::{Accuracy, BlockCodec, Effort, Error, check_rows, levels};
+use std::borrow::Cow;
 
 /// Smallest number of rows for which an anchor of eight bytes is stored.
 const ANCHORED_ROWS: usize = 1024;
@@ -143,8 +144,7 @@ impl BlockCodec {
 
     /// The grid that fits the samples; `None` if only their own bits do.
     pub(crate) fn grid(&self, samples: &[f64]) -> Option<Grid> {
-        let finite = || samples.iter().copied().filter(|x| x.is_finite());
-        let first = finite().next()?;
+        let first = samples.iter().copied().find(|x| x.is_finite())?;
         if let Accuracy::Within {
             delta,
             period: Some(period),
@@ -154,10 +154,12 @@ impl BlockCodec {
         }
         let lossless = self.accuracy == Accuracy::Lossless;
         // Only a lossless block distinguishes the two zeros.
-        let ordinary: Vec<f64> = finite()
-            .filter(|x| !lossless || x.to_bits() != (-0.0_f64).to_bits())
-            .map(|x| x + 0.0)
-            .collect();
+        let is_ordinary = |x: &f64| x.is_finite() & (!lossless | (x.to_bits() != (-0.0_f64).to_bits()));
+        let ordinary: Cow<'_, [f64]> = if samples.iter().fold(true, |all, x| all & is_ordinary(x)) {
+            samples.into()
+        } else {
+            samples.iter().copied().filter(is_ordinary).collect()
+        };
         Grid::decimal(&ordinary, self.delta()).or_else(|| match self.accuracy {
             Accuracy::Lossless => Grid::single(&ordinary),
             Accuracy::Within { delta, .. } => {

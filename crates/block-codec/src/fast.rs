@@ -9,7 +9,7 @@ use crate::{BlockCodec, Error, levels};
 use pco::DeltaSpec;
 
 /// Bits of a row above which a list of levels is considered, pco on the indices, and codings of the samples themselves.
-const FINE_FOR_LEVELS: f32 = 2.5;
+const FINE_FOR_LEVELS: f32 = 1.25;
 pub(crate) const FINE: usize = 4;
 const VERY_FINE: f32 = 12.0;
 /// Bits of a level beside those of its distance to the one before.

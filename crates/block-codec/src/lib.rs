@@ -63,8 +63,8 @@ pub enum Effort {
     /// Mixed models, and pco if the bound is fine: the fewest bits.
     #[default]
     Thorough,
-    /// Counts in few contexts, tables of symbols from 2048 rows on, and pco if the bound is fine: faster, with more bits
-    /// (`docs/adaptive.md` has both).
+    /// Counts in few contexts, tables of symbols from 2048 rows on, a list of levels, or pco: one of them, chosen by an estimate from a part of
+    /// the rows. Faster, with more bits (`docs/adaptive.md` has both).
     Fast,
 }
 

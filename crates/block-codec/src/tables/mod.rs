@@ -53,6 +53,10 @@ const WARM: usize = 256;
 const STRETCH: usize = 512;
 /// Rows of each lane between two looks at the tables.
 const PERIOD: usize = 32;
+/// Rows for which memory is reserved in advance, for each word.
+const ROWS_OF_A_WORD: usize = 64;
+/// Steps of a row at most: two of symbols, four of a whole cell, two of a range, three of low bits.
+const MOST_STEPS: usize = 11;
 /// Smallest number of rows of a block that is coded by tables.
 pub(crate) const TABLES_ROWS: usize = 2048;
 const _: () = assert!(TABLES_ROWS > WARM + 1);
@@ -122,13 +126,16 @@ pub(crate) fn write(indices: &[i64], plan: &Plan, mut bytes: Vec<u8>) -> Result<
 #[inline(always)]
 fn steps<const OF_VALUES: bool>(learned: &[i64], rest: &[i64], low: u32, tail: usize) -> (Steps, usize) {
     let mut tables = Tables::learned::<false, OF_VALUES>(learned, low);
-    let mut steps = Steps::with_capacity(rest.len() + rest.len() / 8);
+    let mut steps = Steps::new();
+    // Most rows are one step, or two with low bits.
+    steps.reserve(2 * rest.len());
     let mut remaining = rest;
     for length in stretches(rest.len() - tail) {
         let mut lanes = [Context::<OF_VALUES>::START; LANES];
         let (rows, others) = remaining.split_at(LANES * length);
         remaining = others;
         for from in (0..length).step_by(PERIOD) {
+            steps.reserve(LANES * PERIOD * MOST_STEPS);
             for row in from..length.min(from + PERIOD) {
                 for (lane, context) in lanes.iter_mut().enumerate() {
                     tables.write(context, rows[lane * length + row], low, |part| steps.push(lane, part));
@@ -138,6 +145,7 @@ fn steps<const OF_VALUES: bool>(learned: &[i64], rest: &[i64], low: u32, tail: u
         }
     }
     let (tail_from, mut context) = (steps.len(), Context::<OF_VALUES>::START);
+    steps.reserve(remaining.len() * MOST_STEPS);
     for difference in remaining {
         tables.write(&mut context, *difference, low, |part| steps.push(0, part));
     }
@@ -210,6 +218,8 @@ impl Head {
         if !odd.is_empty() || words.len() as u64 % 4 != self.words {
             return Err(cut_off());
         }
+        // Memory for all rows at once where so few bytes may hold them: a damaged number of rows takes no more than its bytes.
+        indices.reserve((rows - indices.len()).min(ROWS_OF_A_WORD * words.len()));
         let mut words = Words::new(words);
         let mut tables = Tables::learned::<true, OF_VALUES>(&learned, self.low);
         let mut found = [0; LANES * STRETCH];
@@ -254,7 +264,7 @@ impl Head {
         found: &mut [i64],
     ) {
         // Local variables that nothing else can reach stay in registers.
-        let [mut x0, mut x1, mut x2, mut x3] = *states;
+        let ([mut x0, mut x1, mut x2, mut x3], mut own) = (*states, *words);
         let [mut c0, mut c1, mut c2, mut c3] = [Context::<OF_VALUES>::START; LANES];
         let length = found.len() / LANES;
         let (a, b) = found.split_at_mut(2 * length);
@@ -263,13 +273,13 @@ impl Head {
         let second = c.chunks_mut(PERIOD).zip(d.chunks_mut(PERIOD));
         for ((a, b), (c, d)) in first.zip(second) {
             for ((a, b), (c, d)) in a.iter_mut().zip(b).zip(c.iter_mut().zip(d)) {
-                *a = tables.read::<LOW_BITS, OF_VALUES>(&mut c0, &mut x0, words, self.low);
-                *b = tables.read::<LOW_BITS, OF_VALUES>(&mut c1, &mut x1, words, self.low);
-                *c = tables.read::<LOW_BITS, OF_VALUES>(&mut c2, &mut x2, words, self.low);
-                *d = tables.read::<LOW_BITS, OF_VALUES>(&mut c3, &mut x3, words, self.low);
+                *a = tables.read::<LOW_BITS, OF_VALUES>(&mut c0, &mut x0, &mut own, self.low);
+                *b = tables.read::<LOW_BITS, OF_VALUES>(&mut c1, &mut x1, &mut own, self.low);
+                *c = tables.read::<LOW_BITS, OF_VALUES>(&mut c2, &mut x2, &mut own, self.low);
+                *d = tables.read::<LOW_BITS, OF_VALUES>(&mut c3, &mut x3, &mut own, self.low);
             }
             tables.renew::<true>();
         }
-        *states = [x0, x1, x2, x3];
+        (*states, *words) = ([x0, x1, x2, x3], own);
     }
 }

@@ -37,22 +37,29 @@ impl Order {
         let last = indices[indices.len() - 1];
         let slope = last - indices[indices.len().max(2) - 2];
         let start = indices.len();
-        match self {
-            Self::Values { centre } => indices.extend(differences.iter().map(|difference| centre + difference)),
-            Self::First => indices.extend(differences.iter().scan(last, |last, difference| {
-                *last += difference;
-                Some(*last)
-            })),
-            Self::Second => indices.extend(differences.iter().scan((last, slope), |(last, slope), difference| {
-                *slope = slope.wrapping_add(*difference);
-                *last = last.wrapping_add(*slope);
-                Some(*last)
-            })),
-        }
+        indices.extend_from_slice(differences);
+        let found = &mut indices[start..];
         // Differences that no writer writes may have sums beyond 64 bits: larger indices among them end the block.
-        match indices[start..].iter().find(|index| index.abs() > LARGEST) {
-            Some(index) => Err(damaged(*index)),
-            None => Ok(()),
+        match self {
+            Self::Values { centre } => found.iter_mut().for_each(|index| *index += centre),
+            Self::First => {
+                found.iter_mut().fold(last, |last, index| {
+                    *index += last;
+                    *index
+                });
+            }
+            Self::Second => {
+                found.iter_mut().fold((last, slope), |(last, slope), index| {
+                    let slope = index.wrapping_add(slope);
+                    *index = last.wrapping_add(slope);
+                    (*index, slope)
+                });
+            }
         }
+        let is_large = |index: &i64| index.unsigned_abs() > LARGEST as u64;
+        if found.iter().fold(false, |any, index| any | is_large(index)) {
+            return Err(damaged(found.iter().copied().find(is_large).unwrap_or(0)));
+        }
+        Ok(())
     }
 }

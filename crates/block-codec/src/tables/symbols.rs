@@ -128,10 +128,10 @@ impl Tables {
         words.advance(state, self.parts[at][symbol]);
         let mut cell = symbol as i64 - ZERO as i64;
         if !(1..RANGES).contains(&symbol) {
-            // A copy, so that the state itself stays in a register.
-            let mut x = *state;
-            (symbol, cell) = read_rare(symbol, &mut x, words, low);
-            *state = x;
+            // Copies, so that the state and the words themselves stay in registers.
+            let (mut x, mut rest) = (*state, *words);
+            (symbol, cell) = read_rare(symbol, &mut x, &mut rest, low);
+            (*state, *words) = (x, rest);
         }
         self.counts[at][symbol % SYMBOLS] += 1;
         self.added[at] += 1;
@@ -231,11 +231,15 @@ fn widths<const N: usize>(counts: &[u16; SYMBOLS], common: &[i32; SYMBOLS]) -> [
     // The largest gives or takes what is left. While there are too many it has `SLOTS / SYMBOLS` at least, so each round takes some.
     let mut over = widths.iter().sum::<i32>() - SLOTS as i32;
     while over != 0 {
-        let most = widths.iter().copied().fold(0, i32::max);
-        let taken = over.min(most / 2);
-        if let Some(width) = widths.iter_mut().find(|width| **width == most) {
-            *width -= taken;
-        }
+        // Size and place of the first of the largest ones in one number.
+        let places = (0..SYMBOLS as i32).rev();
+        let largest = widths
+            .iter()
+            .zip(places)
+            .fold(0, |most, (width, place)| most.max(*width << SYMBOL_BITS | place));
+        let place = SYMBOLS - 1 - largest as usize % SYMBOLS;
+        let taken = over.min((largest >> SYMBOL_BITS) / 2);
+        widths[place % N] -= taken;
         over -= taken;
     }
     widths
