@@ -73,8 +73,8 @@ impl BlockCodec {
             if let Some(numbers) = smallest_pco(samples)? {
                 best.keep([&[SAMPLES | 3 << 4], numbers.as_slice()].concat());
             }
-            let keys: Vec<u64> = samples.iter().map(|sample| levels::key_of_sample(*sample)).collect();
-            if let Some(found) = levels::levels(&keys) {
+            let keys = samples.iter().map(|sample| levels::key_of_sample(*sample));
+            if let Some(found) = levels::levels(keys, self.effort) {
                 best.keep(levels::write(vec![SAMPLES], true, &found, None)?);
                 if others.is_some() {
                     best.keep(levels::write(vec![SAMPLES | 64], true, &found, others.as_ref())?);
@@ -106,8 +106,8 @@ impl BlockCodec {
         }
         // On coarse grids the models need far fewer bits. Try the general coder only if a sample takes many bits.
         let is_fine = shortest.0.as_ref().is_none_or(|b| b.len() > FINE * samples.len() / 8);
-        let keys: Vec<u64> = indices.iter().map(|index| levels::key_of_index(*index)).collect();
-        if let Some(found) = levels::levels(&keys) {
+        let keys = indices.iter().map(|index| levels::key_of_index(*index));
+        if let Some(found) = levels::levels(keys, self.effort) {
             shortest.keep(levels::write(head(Coding::Levels, false), true, &found, None)?);
             if others.is_some() {
                 shortest.keep(levels::write(head(Coding::Levels, true), true, &found, others)?);

@@ -5,7 +5,7 @@ use crate::grid::Grid;
 use crate::head::{Coding, SAMPLES, TABLED, write_head};
 use crate::indices::{LEVEL, to_wrapped_pco, write_block};
 use crate::tables::{self, Plan};
-use crate::{BlockCodec, Error, levels};
+use crate::{BlockCodec, Effort, Error, levels};
 use pco::DeltaSpec;
 
 /// Bits of a row above which a list of levels is considered, pco on the indices, and codings of the samples themselves.
@@ -32,7 +32,7 @@ enum Choice {
 
 /// The list of levels, what is coded of their numbers, and bits of a row; `None` if there are too many levels.
 fn few_levels(keys: impl ExactSizeIterator<Item = u64>) -> Option<(Levels, Plan, f32)> {
-    let found = levels::few_levels(keys)?;
+    let found = levels::levels(keys, Effort::Fast)?;
     let (list, numbers) = (&found.0, &found.1);
     let range = (list[list.len() - 1] - list[0]) as f32;
     let mean_distance = (range / list.len() as f32).max(1.0);

@@ -14,6 +14,7 @@
 //!
 //! A level is an index of the block's grid, or a sample itself; both are mapped to unsigned integers of the same order.
 
+use crate::Effort;
 use crate::arithmetic::{Coder, Reader, Writer};
 use crate::bytes::{Bytes, push_varint};
 use crate::counts::{Count, gamma};
@@ -28,6 +29,9 @@ const BY_MODELS: u32 = 61_440;
 const ROWS_PER_LEVEL: usize = 2;
 /// Largest number of levels: the models count that many numbers one by one.
 const MOST_LEVELS: usize = 1 << 16;
+/// Largest number of levels of the fast effort, and how many any rows may have before they are too many for the rows so far.
+const FEW_LEVELS: usize = 4096;
+const FREE_LEVELS: usize = 128;
 /// Lengths of distances, which are contexts of the next one; nodes of the tree of their seven bits.
 const LENGTHS: usize = 65;
 const NODES: usize = 128;
@@ -52,47 +56,32 @@ pub(crate) fn sample_of_key(key: u64) -> f64 {
     f64::from_bits(if key & TOP == 0 { !key } else { key ^ TOP })
 }
 
-/// The sorted levels and the number of each row's; `None` if there are too many to be worth a list, or no gaps between them.
-pub(crate) fn levels(keys: &[u64]) -> Option<(Vec<u64>, Vec<i64>)> {
+/// The sorted levels and the number of each row's; `None` if there are too many to be worth a list, or no gaps between them. If `effort` is
+/// fast, the list must be short, also beside the rows so far.
+pub(crate) fn levels(keys: impl ExactSizeIterator<Item = u64>, effort: Effort) -> Option<(Vec<u64>, Vec<i64>)> {
     let most = (keys.len() / ROWS_PER_LEVEL).min(MOST_LEVELS);
-    let mut levels = keys.to_vec();
-    levels.sort_unstable();
-    levels.dedup();
-    if levels.len() > most || is_dense(&levels) {
-        return None;
-    }
-    let number = |key: &u64| levels.binary_search(key).ok().map(|number| number as i64);
-    let numbers = keys.iter().map(number).collect::<Option<_>>()?;
-    Some((levels, numbers))
-}
-
-/// Largest number of levels that are numbered by [`few_levels`]; slots of its table.
-const FEW_LEVELS: usize = 4096;
-const SLOT_BITS: u32 = 13;
-const _: () = assert!(FEW_LEVELS < 1 << SLOT_BITS);
-/// Number of levels that any rows may have before they are too many for the rows so far.
-const FREE_LEVELS: usize = 128;
-
-/// As [`levels`] for a list that is short beside the rows, in one pass over these.
-pub(crate) fn few_levels(keys: impl ExactSizeIterator<Item = u64>) -> Option<(Vec<u64>, Vec<i64>)> {
-    let rows = keys.len();
-    // Number of the level from one on, in the order of the rows; zero is a free slot.
-    let mut slots = vec![0_u16; 1 << SLOT_BITS];
-    let (mut levels, mut numbers) = (Vec::new(), Vec::with_capacity(rows));
+    let (most, free) = match effort {
+        Effort::Thorough => (most, most),
+        Effort::Fast => (most.min(FEW_LEVELS), FREE_LEVELS),
+    };
+    // Number of the level from one on, in the order of the rows; zero is a free slot, of which at least half are.
+    let slot_bits = (2 * most + 2).next_power_of_two().ilog2();
+    let mut slots = vec![0_u32; 1 << slot_bits];
+    let (mut levels, mut numbers) = (Vec::new(), Vec::with_capacity(keys.len()));
     for (row, key) in keys.enumerate() {
         // Multiplied by the golden ratio, whose high bits depend on all bits of the key.
-        let mut at = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (u64::BITS - SLOT_BITS)) as usize;
+        let mut at = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (u64::BITS - slot_bits)) as usize;
         let number = loop {
             match slots[at] {
                 0 => {
-                    if levels.len() >= (FREE_LEVELS + row / ROWS_PER_LEVEL).min(FEW_LEVELS) {
+                    if levels.len() >= (free + row / ROWS_PER_LEVEL).min(most) {
                         return None;
                     }
                     levels.push(key);
-                    slots[at] = levels.len() as u16;
-                    break levels.len() as u16;
+                    slots[at] = levels.len() as u32;
+                    break levels.len() as u32;
                 }
-                number if levels[usize::from(number) - 1] == key => break number,
+                number if levels[number as usize - 1] == key => break number,
                 _ => at = (at + 1) % slots.len(),
             }
         };
@@ -101,7 +90,7 @@ pub(crate) fn few_levels(keys: impl ExactSizeIterator<Item = u64>) -> Option<(Ve
     let mut order: Vec<usize> = (0..levels.len()).collect();
     order.sort_unstable_by_key(|number| levels[*number]);
     let sorted: Vec<u64> = order.iter().map(|number| levels[*number]).collect();
-    if levels.len() > rows / ROWS_PER_LEVEL || is_dense(&sorted) {
+    if is_dense(&sorted) {
         return None;
     }
     let mut ranks = vec![0; order.len()];
@@ -271,13 +260,15 @@ mod tests {
         for distances in [[1, 1 << 62], [7, 3], [1 << 20, 3 << 20], [u64::MAX / 3, u64::MAX / 3]] {
             let list = [5, 5 + distances[0], 5 + distances[0] + distances[1]];
             let keys: Vec<u64> = (0..50).map(|i| list[(i * i) % 3]).collect();
-            let Some(found) = levels(&keys) else { continue };
+            let Some(found) = levels(keys.iter().copied(), Effort::Thorough) else {
+                continue;
+            };
             for by_models in [true, false] {
                 let bytes = write(vec![], by_models, &found, None).unwrap();
                 assert_eq!(read(&bytes, keys.len(), None).unwrap(), keys);
                 assert!(read(&bytes[..bytes.len() - 1], keys.len(), None).is_err());
             }
         }
-        assert!(levels(&[1, 2, 3, 4]).is_none());
+        assert!(levels([1, 2, 3, 4].into_iter(), Effort::Thorough).is_none());
     }
 }
