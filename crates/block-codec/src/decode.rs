@@ -41,6 +41,10 @@ impl BlockCodec {
                     let keys = levels::read(rest, rows, others.as_ref())?;
                     keys.into_iter().map(levels::sample_of_key).collect()
                 }
+                Coding::TabledLevels => {
+                    let keys = levels::read_tabled(rest, rows)?;
+                    keys.into_iter().map(levels::sample_of_key).collect()
+                }
                 _ => from_pco_bytes::<f64>(rest, rows)?,
             });
         };
@@ -52,6 +56,10 @@ impl BlockCodec {
             Coding::Levels => {
                 let others = joint_columns(&head, others)?;
                 let keys = levels::read(rest, rows, others.as_ref())?;
+                keys.into_iter().map(levels::index_of_key).collect()
+            }
+            Coding::TabledLevels => {
+                let keys = levels::read_tabled(rest, rows)?;
                 keys.into_iter().map(levels::index_of_key).collect()
             }
             Coding::Wrapped => from_wrapped_pco::<i64>(rest, rows)?,
@@ -113,11 +121,11 @@ impl BlockCodec {
         let [is_single, is_wrapped, is_tabled] = [SINGLE, WRAPPED, TABLED].map(|flag| second & flag != 0);
         if second > 127
             || (head & 128 != 0 && second == 0)
-            || (kind == SAMPLES && head & 128 != 0)
+            || (kind == SAMPLES && head & 128 != 0 && (second, coding) != (TABLED, Coding::Levels))
             || (kind == SAMPLES && head & 64 != 0 && coding != Coding::Levels)
             || (is_single && (second & 2 == 0 || kind >= DECIMALS))
             || (is_wrapped && coding != Coding::Pco)
-            || (is_tabled && coding != Coding::Counts)
+            || (is_tabled && (head & 64 != 0 || !matches!(coding, Coding::Counts | Coding::Levels)))
         {
             return Err(Damaged::new(
                 "second byte",
@@ -145,6 +153,7 @@ impl BlockCodec {
         let coding = match coding {
             Coding::Pco if is_wrapped => Coding::Wrapped,
             Coding::Counts if is_tabled => Coding::Tables,
+            Coding::Levels if is_tabled => Coding::TabledLevels,
             coding => coding,
         };
         let grid = grid.map(|grid| if is_single { grid.rounded_to_single() } else { grid });

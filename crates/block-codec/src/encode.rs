@@ -4,19 +4,16 @@ use crate::grid::Grid;
 use crate::head::{Coding, SAMPLES, write_head};
 use crate::indices::{smallest_pco, write_block};
 use crate::rows::Others;
-use crate::tables::{self, TABLES_ROWS};
+use crate::tables::TABLES_ROWS;
 use crate::vectors::vectorised;
 use crate::{Accuracy, BlockCodec, Effort, Error, check_rows, levels};
+use std::borrow::Cow;
 
 /// Smallest number of rows for which an anchor of eight bytes is stored.
 const ANCHORED_ROWS: usize = 1024;
 /// Bits per sample above which pco, and the samples themselves, are tried besides the models.
 pub(crate) const FINE: usize = 2;
-pub(crate) const FINE_IF_FAST: usize = 4;
-const FINE_IF_TABLED: usize = 5;
 const VERY_FINE: usize = 6;
-/// Quarters of a bit per sample up to which counts are tried besides tables: they may be shorter, and are fast.
-const SPARSE_QUARTERS: usize = 3;
 /// Bits per sample up to which only the first grid is tried.
 const FEW: usize = 1;
 
@@ -30,6 +27,12 @@ impl Shortest {
             self.0 = Some(bytes);
         }
     }
+}
+
+/// The samples as they are.
+pub(crate) fn raw(samples: &[f64]) -> Vec<u8> {
+    let numbers = samples.iter().flat_map(|x| x.to_le_bytes());
+    [SAMPLES | 2 << 4].into_iter().chain(numbers).collect()
 }
 
 impl BlockCodec {
@@ -53,31 +56,31 @@ impl BlockCodec {
         if samples.is_empty() {
             return Ok(Vec::new());
         }
+        if self.effort == Effort::Fast {
+            return self.encode_fast(samples);
+        }
         let mut best = Shortest::default();
-        let thorough = self.effort == Effort::Thorough;
         // Other columns may mislead the models: the shorter of both blocks is kept.
-        let others = (thorough && !others.is_empty()).then(|| Others::new(others));
+        let others = (!others.is_empty()).then(|| Others::new(others));
         let few = |best: &Shortest| best.0.as_ref().is_some_and(|b| b.len() <= FEW * samples.len() / 8);
         for (i, grid) in self.grids(samples).into_iter().enumerate() {
-            if i > 0 && (!thorough || few(&best)) {
+            if i > 0 && few(&best) {
                 break;
             }
             self.encode_on(&grid, samples, others.as_ref(), &mut best)?;
         }
         if best.0.as_ref().is_none_or(|b| b.len() > VERY_FINE * samples.len() / 8) {
-            if let Some(numbers) = smallest_pco(samples, thorough)? {
+            if let Some(numbers) = smallest_pco(samples)? {
                 best.keep([&[SAMPLES | 3 << 4], numbers.as_slice()].concat());
             }
-            let keys: Vec<u64> = samples.iter().map(|sample| levels::key_of_sample(*sample)).collect();
-            if let Some(found) = levels::levels(&keys) {
-                best.keep(levels::write(vec![SAMPLES], thorough, &found, None)?);
+            let keys = samples.iter().map(|sample| levels::key_of_sample(*sample));
+            if let Some(found) = levels::levels(keys, self.effort) {
+                best.keep(levels::write(vec![SAMPLES], true, &found, None)?);
                 if others.is_some() {
-                    best.keep(levels::write(vec![SAMPLES | 64], thorough, &found, others.as_ref())?);
+                    best.keep(levels::write(vec![SAMPLES | 64], true, &found, others.as_ref())?);
                 }
             }
-            let mut bytes = vec![SAMPLES | 2 << 4];
-            bytes.extend(samples.iter().flat_map(|x| x.to_le_bytes()));
-            best.keep(bytes);
+            best.keep(raw(samples));
         }
         Ok(best.0.unwrap_or_default())
     }
@@ -91,49 +94,26 @@ impl BlockCodec {
         best: &mut Shortest,
     ) -> Result<(), Error> {
         let (indices, exceptions) = self.indices(grid, samples);
-        let thorough = self.effort == Effort::Thorough;
         let head = |coding, joint| {
             let mut bytes = Vec::new();
             write_head(grid, coding, joint, &exceptions, &mut bytes);
             bytes
         };
         let mut shortest = Shortest::default();
-        let is_tabled = self.is_tabled(samples.len());
-        if is_tabled {
-            shortest.keep(tables::write(&indices, head(Coding::Tables, false))?);
-        }
-        let is_sparse = |best: &Shortest| {
-            best.0
-                .as_ref()
-                .is_none_or(|b| 4 * b.len() <= SPARSE_QUARTERS * samples.len() / 8)
-        };
-        if is_sparse(&shortest) {
-            shortest.keep(write_block(thorough, grid, &indices, &exceptions, None)?);
-        }
+        shortest.keep(write_block(true, grid, &indices, &exceptions, None)?);
         if others.is_some() {
             shortest.keep(write_block(true, grid, &indices, &exceptions, others)?);
         }
-        let is_above =
-            |bits: usize, best: &Shortest| best.0.as_ref().is_none_or(|b| b.len() > bits * samples.len() / 8);
         // On coarse grids the models need far fewer bits. Try the general coder only if a sample takes many bits.
-        let fine = if thorough {
-            FINE
-        } else if is_tabled {
-            FINE_IF_TABLED
-        } else {
-            FINE_IF_FAST
-        };
-        let is_fine = is_above(fine, &shortest);
-        if thorough || is_fine {
-            let keys: Vec<u64> = indices.iter().map(|index| levels::key_of_index(*index)).collect();
-            if let Some(found) = levels::levels(&keys) {
-                shortest.keep(levels::write(head(Coding::Levels, false), thorough, &found, None)?);
-                if others.is_some() {
-                    shortest.keep(levels::write(head(Coding::Levels, true), thorough, &found, others)?);
-                }
+        let is_fine = shortest.0.as_ref().is_none_or(|b| b.len() > FINE * samples.len() / 8);
+        let keys = indices.iter().map(|index| levels::key_of_index(*index));
+        if let Some(found) = levels::levels(keys, self.effort) {
+            shortest.keep(levels::write(head(Coding::Levels, false), true, &found, None)?);
+            if others.is_some() {
+                shortest.keep(levels::write(head(Coding::Levels, true), true, &found, others)?);
             }
         }
-        if is_fine && let Some(numbers) = smallest_pco(&indices, thorough)? {
+        if is_fine && let Some(numbers) = smallest_pco(&indices)? {
             let mut bytes = head(Coding::Wrapped, false);
             bytes.extend(numbers);
             shortest.keep(bytes);
@@ -148,7 +128,7 @@ impl BlockCodec {
     }
 
     /// The grids that are tried; none if only the samples' own bits fit.
-    fn grids(&self, samples: &[f64]) -> Vec<Grid> {
+    pub(crate) fn grids(&self, samples: &[f64]) -> Vec<Grid> {
         let mut grids: Vec<Grid> = self.grid(samples).into_iter().collect();
         // Directions with few decimals have their own grid, which is better for fine bounds.
         if let Accuracy::Within {
@@ -164,8 +144,7 @@ impl BlockCodec {
 
     /// The grid that fits the samples; `None` if only their own bits do.
     pub(crate) fn grid(&self, samples: &[f64]) -> Option<Grid> {
-        let finite = || samples.iter().copied().filter(|x| x.is_finite());
-        let first = finite().next()?;
+        let first = samples.iter().copied().find(|x| x.is_finite())?;
         if let Accuracy::Within {
             delta,
             period: Some(period),
@@ -175,10 +154,12 @@ impl BlockCodec {
         }
         let lossless = self.accuracy == Accuracy::Lossless;
         // Only a lossless block distinguishes the two zeros.
-        let ordinary: Vec<f64> = finite()
-            .filter(|x| !lossless || x.to_bits() != (-0.0_f64).to_bits())
-            .map(|x| x + 0.0)
-            .collect();
+        let is_ordinary = |x: &f64| x.is_finite() & (!lossless | (x.to_bits() != (-0.0_f64).to_bits()));
+        let ordinary: Cow<'_, [f64]> = if samples.iter().fold(true, |all, x| all & is_ordinary(x)) {
+            samples.into()
+        } else {
+            samples.iter().copied().filter(is_ordinary).collect()
+        };
         Grid::decimal(&ordinary, self.delta()).or_else(|| match self.accuracy {
             Accuracy::Lossless => Grid::single(&ordinary),
             Accuracy::Within { delta, .. } => {

@@ -2,7 +2,7 @@
 
 use crate::Effort;
 use crate::bytes::{push_varint, zigzag};
-use crate::vectors::{rounded, vectorised, vectorised_narrow};
+use crate::vectors::{double, rounded, vectorised};
 use fewbits_node::adaptive::TENS;
 
 /// Largest sample as a decimal integer: sums of two are exact doubles.
@@ -81,6 +81,18 @@ fn greatest_common_divisor(mut a: i64, mut b: i64) -> i64 {
     a.abs()
 }
 
+/// The largest number of which all these are multiples; 0 if they are all 0.
+fn common_unit(numbers: impl Iterator<Item = i64>) -> i64 {
+    let mut unit = 0;
+    for number in numbers {
+        unit = greatest_common_divisor(unit, number);
+        if unit == 1 {
+            break;
+        }
+    }
+    unit
+}
+
 impl Grid {
     /// The decimal grid that fits all samples, if there is one. `delta` is zero if samples must be exact.
     pub(crate) fn decimal(samples: &[f64], delta: f64) -> Option<Self> {
@@ -101,7 +113,7 @@ impl Grid {
         let mut all = samples.iter().filter_map(|x| digits(*x, ten));
         let origin = all.next()?;
         // If all samples are multiples of a larger unit (for example an ADC step in millivolts), count in that unit.
-        let unit = all.fold(0, |unit, digits| greatest_common_divisor(unit, digits - origin));
+        let unit = common_unit(all.map(|digits| digits - origin));
         Some(if unit <= 1 {
             plain
         } else {
@@ -118,8 +130,7 @@ impl Grid {
         let ten = TENS[usize::from(decimals)];
         let mut all = samples.iter().filter_map(|x| single_digits(*x, ten));
         let origin = all.next()?;
-        let unit = all.fold(0, |unit, digits| greatest_common_divisor(unit, digits - origin));
-        let unit = unit.max(1);
+        let unit = common_unit(all.map(|digits| digits - origin)).max(1);
         Some(Self::Single { decimals, unit, origin })
     }
 
@@ -180,7 +191,7 @@ impl Grid {
             Effort::Fast => 1 << 13,
         };
         // Under phase `p` a sample is in cell `(place - p) / 16`, rounded down: for each phase, how often the cell changes.
-        let crossings = vectorised_narrow(
+        let crossings = vectorised(
             #[inline(always)]
             || {
                 let mut crossings = [0_u32; PHASES as usize];
@@ -291,13 +302,33 @@ impl Grid {
     /// The reconstructions of indices.
     pub(crate) fn values(&self, indices: &[i64]) -> Vec<f64> {
         // If all indices are a little smaller than these limits, arithmetic in doubles is exact and can be vectorised.
-        let exact = |largest: i64| indices.iter().all(|index| index.unsigned_abs() < largest as u64);
+        let exact = |largest: i64| {
+            let largest = largest.min(LARGEST_DIGITS as i64) as u64;
+            indices
+                .iter()
+                .fold(true, |all, index| all & (index.unsigned_abs() < largest))
+        };
         match *self {
             Self::Decimal { decimals, width, phase } if exact(WHOLE / (4 * width)) => {
                 let moved = (width - 1 + 2 * Self::digits_moved(width, phase)) as f64;
                 let (width, ten) = (width as f64, TENS[usize::from(decimals)]);
-                let twice = indices.iter().map(|index| 2.0 * width * *index as f64 + moved);
-                twice.map(|twice| 0.5 * twice / ten).collect()
+                vectorised(
+                    #[inline(always)]
+                    || {
+                        let twice = indices.iter().map(|index| 2.0 * width * double(*index) + moved);
+                        twice.map(|twice| 0.5 * twice / ten).collect()
+                    },
+                )
+            }
+            Self::Line { anchor, step, phase } if exact(LARGEST_DIGITS as i64) => {
+                let moved = f64::from(phase) / f64::from(PHASES);
+                vectorised(
+                    #[inline(always)]
+                    || {
+                        let values = indices.iter().map(|index| anchor + step * (double(*index) + moved));
+                        values.map(|value| value.clamp(f64::MIN, f64::MAX)).collect()
+                    },
+                )
             }
             _ => indices.iter().map(|index| self.value(*index)).collect(),
         }

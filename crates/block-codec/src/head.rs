@@ -8,7 +8,7 @@ pub(crate) const LINE: u8 = 13;
 pub(crate) const CIRCLE: u8 = 14;
 pub(crate) const SAMPLES: u8 = 15;
 
-/// Flags of the second byte: decimals are rounded to single precision; pco is in its wrapped form; tables follow the counts.
+/// Flags of the second byte: decimals are rounded to single precision; pco is in its wrapped form; tables follow the counts, or the list of levels.
 pub(crate) const SINGLE: u8 = 16;
 pub(crate) const WRAPPED: u8 = 32;
 pub(crate) const TABLED: u8 = 64;
@@ -24,6 +24,8 @@ pub(crate) enum Coding {
     Tables,
     /// A list of levels, and their numbers.
     Levels,
+    /// A list of levels, and tables of symbols for their numbers.
+    TabledLevels,
     /// pco in its wrapped form.
     Wrapped,
 }
@@ -51,6 +53,7 @@ pub(crate) fn write_head(grid: &Grid, coding: Coding, joint: bool, exceptions: &
         Coding::Raw | Coding::Levels => (2, 0),
         Coding::Counts => (3, 0),
         Coding::Tables => (3, TABLED),
+        Coding::TabledLevels => (2, TABLED),
     };
     let moved = if grid.phase() == 0 { 0 } else { 8 };
     let second = own | moved | form | u8::from(!exceptions.is_empty());

@@ -123,49 +123,55 @@ pub(crate) fn read_block(
 /// Orders of differences that are tried besides the one that pco chooses, which is bad for few distinct indices.
 const ORDERS: [usize; 2] = [0, 1];
 /// Effort of pco, which costs time only: to choose the order, and for the best order.
-const LEVEL: usize = 8;
+pub(crate) const LEVEL: usize = 8;
 const MOST_LEVEL: usize = 12;
 /// Largest number of rows of a page of pco.
 const MOST_ROWS: usize = 1 << 24;
 /// Number of rows that are read at once: pco reads whole batches of 256.
 const BATCH: usize = 1 << 12;
 
-/// The shortest of several codes of pco, in its wrapped form: the container has the number of rows and the type. `None` for too many rows.
-pub(crate) fn smallest_pco<T: Number>(numbers: &[T], thorough: bool) -> Result<Option<Vec<u8>>, Damaged> {
+/// The numbers in pco's wrapped form: the container has the number of rows and the type. `None` for too many rows.
+pub(crate) fn to_wrapped_pco<T: Number>(
+    numbers: &[T],
+    delta: &DeltaSpec,
+    level: usize,
+) -> Result<Option<Vec<u8>>, Damaged> {
     if numbers.is_empty() || numbers.len() > MOST_ROWS {
         return Ok(None);
     }
-    let code = |delta: &DeltaSpec, level: usize| -> Result<Vec<u8>, Damaged> {
-        let config = ChunkConfig::default().with_compression_level(level);
-        let config = config
-            .with_delta_spec(delta.clone())
-            .with_paging_spec(PagingSpec::Exact(vec![numbers.len()]));
-        let file = FileCompressor::default();
-        let mut bytes = Vec::new();
-        file.write_header(&mut bytes).map_err(from_pco)?;
-        let mut chunk = file.chunk_compressor(numbers, &config).map_err(from_pco)?;
-        chunk.write_meta(&mut bytes).map_err(from_pco)?;
-        chunk.write_page(0, &mut bytes).map_err(from_pco)?;
-        Ok(bytes)
-    };
+    let config = ChunkConfig::default().with_compression_level(level);
+    let config = config
+        .with_delta_spec(delta.clone())
+        .with_paging_spec(PagingSpec::Exact(vec![numbers.len()]));
+    let file = FileCompressor::default();
+    let mut bytes = Vec::new();
+    file.write_header(&mut bytes).map_err(from_pco)?;
+    let mut chunk = file.chunk_compressor(numbers, &config).map_err(from_pco)?;
+    chunk.write_meta(&mut bytes).map_err(from_pco)?;
+    chunk.write_page(0, &mut bytes).map_err(from_pco)?;
+    Ok(Some(bytes))
+}
+
+/// The shortest of several codes of [`to_wrapped_pco`].
+pub(crate) fn smallest_pco<T: Number>(numbers: &[T]) -> Result<Option<Vec<u8>>, Damaged> {
     let mut delta = DeltaSpec::default();
-    let mut best = code(&delta, LEVEL)?;
-    for order in ORDERS.map(DeltaSpec::TryConsecutive) {
-        let bytes = code(&order, LEVEL)?;
-        if bytes.len() < best.len() {
-            (best, delta) = (bytes, order);
-        }
-    }
-    if thorough {
-        let bytes = code(&delta, MOST_LEVEL)?;
-        if bytes.len() < best.len() {
-            best = bytes;
+    let Some(mut best) = to_wrapped_pco(numbers, &delta, LEVEL)? else {
+        return Ok(None);
+    };
+    for (order, level) in ORDERS
+        .map(|order| (Some(order), LEVEL))
+        .into_iter()
+        .chain([(None, MOST_LEVEL)])
+    {
+        let tried = order.map_or_else(|| delta.clone(), DeltaSpec::TryConsecutive);
+        if let Some(bytes) = to_wrapped_pco(numbers, &tried, level)?.filter(|bytes| bytes.len() < best.len()) {
+            (best, delta) = (bytes, tried);
         }
     }
     Ok(Some(best))
 }
 
-/// Numbers of [`smallest_pco`]. Nothing may follow them.
+/// Numbers of [`to_wrapped_pco`]. Nothing may follow them.
 pub(crate) fn from_wrapped_pco<T: Number + Default>(bytes: &[u8], rows: usize) -> Result<Vec<T>, Damaged> {
     if rows > MOST_ROWS {
         return Err(from_pco(format!("{rows} rows")));

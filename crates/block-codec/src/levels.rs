@@ -9,13 +9,19 @@
 //! first number: its length in bits is that of the number of levels - 1   further numbers: as indices of other blocks
 //! ```
 //!
+//! With tables the arithmetic code has the list alone (from "number of levels" to "distances"). In front of it stands its length in bytes, a
+//! varint; behind it are the numbers of all rows as in module `tables`.
+//!
 //! A level is an index of the block's grid, or a sample itself; both are mapped to unsigned integers of the same order.
 
+use crate::Effort;
 use crate::arithmetic::{Coder, Reader, Writer};
+use crate::bytes::{Bytes, push_varint};
 use crate::counts::{Count, gamma};
 use crate::error::Damaged;
 use crate::indices::{Rest, code_rest};
 use crate::rows::Others;
+use crate::tables::{self, Plan};
 
 /// Probability, in units of `2^-16`, that numbers are coded by models.
 const BY_MODELS: u32 = 61_440;
@@ -23,6 +29,9 @@ const BY_MODELS: u32 = 61_440;
 const ROWS_PER_LEVEL: usize = 2;
 /// Largest number of levels: the models count that many numbers one by one.
 const MOST_LEVELS: usize = 1 << 16;
+/// Largest number of levels of the fast effort, and how many any rows may have before they are too many for the rows so far.
+const FEW_LEVELS: usize = 4096;
+const FREE_LEVELS: usize = 128;
 /// Lengths of distances, which are contexts of the next one; nodes of the tree of their seven bits.
 const LENGTHS: usize = 65;
 const NODES: usize = 128;
@@ -47,20 +56,58 @@ pub(crate) fn sample_of_key(key: u64) -> f64 {
     f64::from_bits(if key & TOP == 0 { !key } else { key ^ TOP })
 }
 
-/// The sorted levels and the number of each row's; `None` if there are too many to be worth a list, or no gaps between them.
-pub(crate) fn levels(keys: &[u64]) -> Option<(Vec<u64>, Vec<i64>)> {
+/// The sorted levels and the number of each row's; `None` if there are too many to be worth a list, or no gaps between them. If `effort` is
+/// fast, the list must be short, also beside the rows so far.
+pub(crate) fn levels(keys: impl ExactSizeIterator<Item = u64>, effort: Effort) -> Option<(Vec<u64>, Vec<i64>)> {
     let most = (keys.len() / ROWS_PER_LEVEL).min(MOST_LEVELS);
-    let mut levels = keys.to_vec();
-    levels.sort_unstable();
-    levels.dedup();
-    let (first, last) = (*levels.first()?, *levels.last()?);
-    let is_dense = last - first < 2 * levels.len() as u64;
-    if levels.len() > most || is_dense {
+    let (most, free) = match effort {
+        Effort::Thorough => (most, most),
+        Effort::Fast => (most.min(FEW_LEVELS), FREE_LEVELS),
+    };
+    // Number of the level from one on, in the order of the rows; zero is a free slot, of which at least half are.
+    let slot_bits = (2 * most + 2).next_power_of_two().ilog2();
+    let mut slots = vec![0_u32; 1 << slot_bits];
+    let (mut levels, mut numbers) = (Vec::new(), Vec::with_capacity(keys.len()));
+    for (row, key) in keys.enumerate() {
+        // Multiplied by the golden ratio, whose high bits depend on all bits of the key.
+        let mut at = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (u64::BITS - slot_bits)) as usize;
+        let number = loop {
+            match slots[at] {
+                0 => {
+                    if levels.len() >= (free + row / ROWS_PER_LEVEL).min(most) {
+                        return None;
+                    }
+                    levels.push(key);
+                    slots[at] = levels.len() as u32;
+                    break levels.len() as u32;
+                }
+                number if levels[number as usize - 1] == key => break number,
+                _ => at = (at + 1) % slots.len(),
+            }
+        };
+        numbers.push(i64::from(number) - 1);
+    }
+    let mut order: Vec<usize> = (0..levels.len()).collect();
+    order.sort_unstable_by_key(|number| levels[*number]);
+    let sorted: Vec<u64> = order.iter().map(|number| levels[*number]).collect();
+    if is_dense(&sorted) {
         return None;
     }
-    let number = |key: &u64| levels.binary_search(key).ok().map(|number| number as i64);
-    let numbers = keys.iter().map(number).collect::<Option<_>>()?;
-    Some((levels, numbers))
+    let mut ranks = vec![0; order.len()];
+    order
+        .iter()
+        .enumerate()
+        .for_each(|(rank, number)| ranks[*number] = rank as i64);
+    numbers.iter_mut().for_each(|number| *number = ranks[*number as usize]);
+    Some((sorted, numbers))
+}
+
+/// Whether at least every second key from the lowest to the highest is a level.
+fn is_dense(levels: &[u64]) -> bool {
+    match levels {
+        [first, .., last] => last - first < 2 * levels.len() as u64,
+        _ => true,
+    }
 }
 
 /// Codes the list of levels: `wanted` at the writer, `None` at the reader.
@@ -126,7 +173,11 @@ fn code<C: Coder>(
             .and_then(|number| levels.get(number).copied())
     };
     let levels = numbers.iter().map(level).collect::<Option<Vec<u64>>>();
-    levels.ok_or_else(|| Damaged::new("level", "beyond the last one", "one of the list"))
+    levels.ok_or_else(beyond_the_list)
+}
+
+fn beyond_the_list() -> Damaged {
+    Damaged::new("level", "beyond the last one", "one of the list")
 }
 
 /// Appends the code of keys with these levels to the head of a block.
@@ -139,6 +190,33 @@ pub(crate) fn write(
     let mut writer = Writer::new(head);
     code(&mut writer, by_models, Some(wanted), wanted.1.len(), others)?;
     Ok(writer.finish())
+}
+
+/// Appends the code of keys with these levels, and tables for their numbers, to the head of a block.
+pub(crate) fn write_tabled(
+    mut head: Vec<u8>,
+    (levels, numbers): &(Vec<u64>, Vec<i64>),
+    plan: &Plan,
+) -> Result<Vec<u8>, Damaged> {
+    let mut writer = Writer::default();
+    code_levels(&mut writer, Some(levels), numbers.len())?;
+    let list = writer.finish();
+    push_varint(&mut head, list.len() as u64);
+    head.extend_from_slice(&list);
+    tables::write(numbers, plan, head)
+}
+
+/// The keys of all rows of a block of [`write_tabled`].
+pub(crate) fn read_tabled(bytes: &[u8], rows: usize) -> Result<Vec<u64>, Damaged> {
+    let mut bytes = Bytes(bytes);
+    let length = bytes.count(usize::MAX, "length of levels")?;
+    let mut reader = Reader::new(bytes.take(length)?);
+    let levels = code_levels(&mut reader, None, rows)?;
+    reader.finish()?;
+    let numbers = tables::read(bytes.0, rows)?;
+    let level = |number: i64| usize::try_from(number).ok().and_then(|number| levels.get(number));
+    let levels = numbers.into_iter().map(|number| level(number).copied());
+    levels.collect::<Option<_>>().ok_or_else(beyond_the_list)
 }
 
 /// The keys of all rows.
@@ -182,13 +260,15 @@ mod tests {
         for distances in [[1, 1 << 62], [7, 3], [1 << 20, 3 << 20], [u64::MAX / 3, u64::MAX / 3]] {
             let list = [5, 5 + distances[0], 5 + distances[0] + distances[1]];
             let keys: Vec<u64> = (0..50).map(|i| list[(i * i) % 3]).collect();
-            let Some(found) = levels(&keys) else { continue };
+            let Some(found) = levels(keys.iter().copied(), Effort::Thorough) else {
+                continue;
+            };
             for by_models in [true, false] {
                 let bytes = write(vec![], by_models, &found, None).unwrap();
                 assert_eq!(read(&bytes, keys.len(), None).unwrap(), keys);
                 assert!(read(&bytes[..bytes.len() - 1], keys.len(), None).is_err());
             }
         }
-        assert!(levels(&[1, 2, 3, 4]).is_none());
+        assert!(levels([1, 2, 3, 4].into_iter(), Effort::Thorough).is_none());
     }
 }

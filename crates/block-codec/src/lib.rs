@@ -20,7 +20,7 @@
 //! | part | bytes | when |
 //! |---|---|---|
 //! | head | 1 | always: low 4 bits the grid (0 to 12: decimals of the samples; 13: line; 14: circle; 15: the samples themselves), then 2 bits the coding (0: models, of samples levels; 1: pco; 2: levels, of samples as they are; 3: counts, of samples wrapped pco), 1 bit joint, 1 bit whether a second byte follows |
-//! | second | 1 | bit 0: exceptions; bit 1: steps; bit 2: anchor; bit 3: phase; bit 4: decimals are rounded to single precision; bit 5: pco is in its wrapped form; bit 6: counts are followed by tables. Bit 7 is 0 |
+//! | second | 1 | bit 0: exceptions; bit 1: steps; bit 2: anchor; bit 3: phase; bit 4: decimals are rounded to single precision; bit 5: pco is in its wrapped form; bit 6: counts, or the list of levels, are followed by tables (levels of samples have a second byte only then). Bit 7 is 0 |
 //! | steps | 2 varints | unit and origin (zigzag) in units of the last decimal |
 //! | anchor | 8 | a point of the line, little-endian; otherwise zero is one |
 //! | phase | 1 | the grid of a line, or of cells of several decimals, is moved by so many sixteenths of a cell (1 to 15; whole decimals, rounded up) |
@@ -37,6 +37,7 @@ mod decode;
 mod encode;
 mod error;
 mod experts;
+mod fast;
 pub mod frame;
 mod grid;
 mod head;
@@ -62,8 +63,8 @@ pub enum Effort {
     /// Mixed models, and pco if the bound is fine: the fewest bits.
     #[default]
     Thorough,
-    /// Counts in few contexts, tables of symbols from 2048 rows on, and pco if the bound is fine: faster, with more bits
-    /// (`docs/adaptive.md` has both).
+    /// Counts in few contexts, tables of symbols from 2048 rows on, a list of levels, or pco: one of them, chosen by an estimate from a part of
+    /// the rows. Faster, with more bits (`docs/adaptive.md` has both).
     Fast,
 }
 

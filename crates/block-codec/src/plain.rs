@@ -1,13 +1,11 @@
 //! The indices of whole columns that lie on their grid, by vector instructions.
 
 use crate::grid::{Grid, PHASES, WHOLE};
-use crate::vectors::{rounded, vectorised};
+use crate::vectors::{SHIFT, rounded, vectorised};
 use fewbits_node::adaptive::TENS;
 
 /// Largest index.
 const LARGEST_INDEX: f64 = crate::rows::LARGEST as f64;
-/// In doubles of this size the last bit is a one.
-const SHIFT: f64 = 1.5 * (1_u64 << 52) as f64;
 
 /// A whole number of at most `2^51` in size as an integer; any other gives any integer.
 #[inline(always)]

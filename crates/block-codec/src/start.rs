@@ -190,7 +190,7 @@ impl BlockCodec {
         // Tables are in blocks of their own only.
         let fine = match self.effort {
             Effort::Thorough => crate::encode::FINE,
-            Effort::Fast => crate::encode::FINE_IF_FAST,
+            Effort::Fast => crate::fast::FINE,
         };
         let is_fine = found
             .first()

@@ -21,3 +21,12 @@ pub(crate) fn vectorised_narrow<R>(work: impl FnOnce() -> R) -> R {
 pub(crate) fn rounded(x: f64) -> f64 {
     (x + 0.499_999_999_999_999_94_f64.copysign(x)).trunc()
 }
+
+/// In doubles of this size the last bit is a one.
+pub(crate) const SHIFT: f64 = 1.5 * (1_u64 << 52) as f64;
+
+/// An integer of at most `2^51` in size as a double, in instructions that exist for vectors.
+#[inline(always)]
+pub(crate) fn double(x: i64) -> f64 {
+    f64::from_bits(SHIFT.to_bits().wrapping_add_signed(x)) - SHIFT
+}

@@ -97,7 +97,7 @@ pub(crate) struct PackOptions {
     /// File of the recording, or folder of the recordings of several files. Default: standard output.
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
-    /// Encode about ten times as fast, with 1.03 to 1.12 times the bits. Columns are then not predicted from each other.
+    /// Encode more than ten times as fast, with 1.03 to 1.12 times the bits in the mean of many series. Columns are then not predicted from each other.
     #[arg(long)]
     pub(crate) fast: bool,
     /// Continue the recording in `--output`, with its columns and bounds.

@@ -65,7 +65,7 @@ pub(crate) struct RepackOptions {
     /// Number of rows per block. A damaged block loses its rows only.
     #[arg(long, visible_alias = "independent", default_value_t = fewbits_record::ROWS_PER_BLOCK, value_name = "ROWS")]
     pub(crate) rows_per_block: usize,
-    /// Encode about ten times as fast, with 1.03 to 1.12 times the bits.
+    /// Encode more than ten times as fast, with 1.03 to 1.12 times the bits in the mean of many series.
     #[arg(long)]
     pub(crate) fast: bool,
     /// Write the new recording here, and leave the old one. Only for one recording.

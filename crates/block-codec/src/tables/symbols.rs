@@ -1,132 +1,12 @@
-//! Symbols of differences, their contexts, and the tables that follow from how often each was seen.
-//!
-//! A difference is turned so that the last one that was not in the cell of zero was positive, and divided by `2^k`, rounded down: its cell. The `k` low bits are raw.
-//!
-//! ```text
-//! symbol 0          a symbol that has no slot: 6 raw bits tell which; if these are 0, 50 raw bits hold the cell in zigzag form
-//!        1 to 31    cells -15 to 15
-//!        32 to 63   cells of size 2^e to 2^(e + 1) - 1, e = 4 to 19: 32 + 2 (e - 4), one more if positive; e raw bits are the rest of the size
-//! ```
-//!
-//! Contexts: while the cell is zero, for how many rows (1, 2, 3 to 4, 5 to 8, 9 to 16, more; 1 also at the beginning); otherwise its size (1, 2, 3, more) and whether the
-//! cell before was of the other sign, zero, of the same.
+//! Tables of symbols, which follow from how often each was seen.
 
+use super::alphabet::{
+    CONTEXTS, Context, ESCAPE, RANGE_BITS, RANGES, STATES, SYMBOL_BITS, SYMBOLS, WHOLE_BITS, ZERO, symbol,
+};
 use super::words::{Part, SLOTS, Step, Words, raw_steps};
 use crate::bytes::{unzigzag, zigzag};
 use crate::rows::LARGEST;
-
-const SYMBOLS: usize = 64;
-const SYMBOL_BITS: u32 = 6;
-/// Symbol of what has no slot.
-const ESCAPE: usize = 0;
-/// Symbol of the cell zero.
-const ZERO: usize = 16;
-/// First symbol of several cells, and the logarithm of their smallest size.
-const RANGES: usize = 32;
-const RANGE_BITS: u32 = 4;
-/// Bits of a cell that has no symbol.
-const WHOLE_BITS: u32 = 50;
-
-/// States of a context: how long the cell is zero, then sizes with the sign before.
-const RUNS: usize = 17;
-const SIZES: usize = 4;
-const STATES: usize = 32;
-const CONTEXTS: usize = 6 + 3 * SIZES;
-const _: () = assert!(RUNS + 3 * SIZES <= STATES && CONTEXTS <= STATES);
-
-/// The context of a state.
-const fn context_of(state: usize) -> usize {
-    match state {
-        0 => 0,
-        1 => 1,
-        2..=3 => 2,
-        4..=7 => 3,
-        8..=15 => 4,
-        _ => state + 5 - (RUNS - 1),
-    }
-}
-
-/// The state behind a symbol, times 256, and its context: at `SYMBOLS state + symbol`.
-const NEXT: [u16; STATES * SYMBOLS] = {
-    let mut next = [0; STATES * SYMBOLS];
-    let mut at = 0;
-    while at < next.len() {
-        let (state, symbol) = (at / SYMBOLS, at % SYMBOLS);
-        let is_up = if symbol < RANGES {
-            symbol > ZERO || symbol == ESCAPE
-        } else {
-            symbol % 2 == 1
-        };
-        let size = if symbol == ESCAPE || symbol >= RANGES {
-            SIZES
-        } else {
-            symbol.abs_diff(ZERO)
-        };
-        let size = if size > SIZES { SIZES } else { size };
-        let to = if size == 0 {
-            if state + 1 < RUNS {
-                state + 1
-            } else if state < RUNS {
-                RUNS - 1
-            } else {
-                0
-            }
-        } else {
-            let before = if state < RUNS {
-                1
-            } else if is_up {
-                2
-            } else {
-                0
-            };
-            RUNS + 3 * (size - 1) + before
-        };
-        next[at] = (to << 8 | context_of(to)) as u16;
-        at += 1;
-    }
-    next
-};
-
-/// What the next symbol of a lane depends on.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Context {
-    /// State and context, as in [`NEXT`].
-    state: u16,
-    /// -1 if differences are turned, otherwise 0.
-    turn: i64,
-}
-
-impl Context {
-    pub(super) const START: Self = Self { state: 0, turn: 0 };
-
-    #[inline(always)]
-    fn index(self) -> usize {
-        usize::from(self.state) % STATES
-    }
-
-    #[inline(always)]
-    fn turned(self, difference: i64) -> i64 {
-        (difference ^ self.turn) - self.turn
-    }
-
-    #[inline(always)]
-    fn follow(&mut self, symbol: usize, is_negative: bool) {
-        self.state = NEXT[(usize::from(self.state >> 8) * SYMBOLS + symbol) % NEXT.len()];
-        self.turn ^= -i64::from(is_negative);
-    }
-}
-
-/// The symbol of a cell, and its number of raw bits.
-#[inline(always)]
-fn symbol(cell: i64) -> (usize, u32) {
-    let size = cell.unsigned_abs();
-    if size < ZERO as u64 {
-        return ((cell + ZERO as i64) as usize, 0);
-    }
-    let bits = size.ilog2();
-    let symbol = RANGES + 2 * (bits - RANGE_BITS) as usize + usize::from(cell > 0);
-    if symbol < SYMBOLS { (symbol, bits) } else { (ESCAPE, 0) }
-}
+use fewbits_node::elementary::log2;
 
 /// Weight of the frequencies of all contexts in each, in symbols.
 const COMMON: f32 = 24.0;
@@ -137,6 +17,38 @@ const FEW: u16 = 8;
 const GROWTH: u16 = 5;
 /// Number of symbols from which on counts are halved when a table is made.
 const MOST: u16 = 1024;
+
+/// Estimated bits of a row: each of these runs of differences is coded by the counts of all its other symbols.
+pub(super) fn estimated_bits<'a, const OF_VALUES: bool>(runs: impl Iterator<Item = &'a [i64]>, low: u32) -> f32 {
+    let (mut counts, mut all) = ([[0_u16; SYMBOLS]; STATES], [0_u16; SYMBOLS]);
+    let (mut rows, mut raw) = (0, 0);
+    for run in runs {
+        let mut context = Context::<OF_VALUES>::START;
+        for difference in run {
+            let cell = context.turned(*difference) >> low;
+            let (symbol, bits) = symbol(cell);
+            counts[context.index()][symbol] += 1;
+            all[symbol] += 1;
+            raw += low
+                + if symbol == ESCAPE {
+                    SYMBOL_BITS + WHOLE_BITS
+                } else {
+                    bits
+                };
+            context.follow(symbol, cell < 0);
+        }
+        rows += run.len();
+    }
+    let common = all.map(|count| COMMON * f32::from(count) / rows.max(1) as f32);
+    let mut sum = raw as f32;
+    for counts in &counts[..CONTEXTS] {
+        let other = counts.iter().sum::<u16>() as f32 + COMMON - 1.0;
+        for (count, common) in counts.iter().zip(common).filter(|(count, _)| **count > 0) {
+            sum += f32::from(*count) * log2(other / (f32::from(*count) - 1.0 + common));
+        }
+    }
+    sum / rows.max(1) as f32
+}
 
 /// Tables of all contexts.
 #[derive(Debug)]
@@ -153,7 +65,7 @@ pub(super) struct Tables {
 impl Tables {
     /// Tables after these differences. Those of writers have no slots.
     #[inline(always)]
-    pub(super) fn learned<const READS: bool>(differences: &[i64], low: u32) -> Box<Self> {
+    pub(super) fn learned<const READS: bool, const OF_VALUES: bool>(differences: &[i64], low: u32) -> Box<Self> {
         let mut tables = Box::new(Self {
             counts: [[0; SYMBOLS]; STATES],
             sums: [0; STATES],
@@ -161,7 +73,7 @@ impl Tables {
             parts: [[Part::default(); SYMBOLS]; STATES],
             slots: [[0; SLOTS + AT_ONCE]; STATES],
         });
-        let mut context = Context::START;
+        let mut context = Context::<OF_VALUES>::START;
         for difference in differences {
             let cell = context.turned(*difference) >> low;
             let (symbol, _) = symbol(cell);
@@ -174,7 +86,13 @@ impl Tables {
 
     /// Writes a difference as one step or several.
     #[inline(always)]
-    pub(super) fn write(&mut self, context: &mut Context, difference: i64, low: u32, mut push: impl FnMut(Step)) {
+    pub(super) fn write<const OF_VALUES: bool>(
+        &mut self,
+        context: &mut Context<OF_VALUES>,
+        difference: i64,
+        low: u32,
+        mut push: impl FnMut(Step),
+    ) {
         let turned = context.turned(difference);
         let cell = turned >> low;
         let (symbol, bits) = symbol(cell);
@@ -198,9 +116,9 @@ impl Tables {
 
     /// The difference that [`write`](Self::write) wrote.
     #[inline(always)]
-    pub(super) fn read<const LOW_BITS: bool>(
+    pub(super) fn read<const LOW_BITS: bool, const OF_VALUES: bool>(
         &mut self,
-        context: &mut Context,
+        context: &mut Context<OF_VALUES>,
         state: &mut u32,
         words: &mut Words<'_>,
         low: u32,
@@ -210,10 +128,10 @@ impl Tables {
         words.advance(state, self.parts[at][symbol]);
         let mut cell = symbol as i64 - ZERO as i64;
         if !(1..RANGES).contains(&symbol) {
-            // A copy, so that the state itself stays in a register.
-            let mut x = *state;
-            (symbol, cell) = read_rare(symbol, &mut x, words, low);
-            *state = x;
+            // Copies, so that the state and the words themselves stay in registers.
+            let (mut x, mut rest) = (*state, *words);
+            (symbol, cell) = read_rare(symbol, &mut x, &mut rest, low);
+            (*state, *words) = (x, rest);
         }
         self.counts[at][symbol % SYMBOLS] += 1;
         self.added[at] += 1;
@@ -313,11 +231,15 @@ fn widths<const N: usize>(counts: &[u16; SYMBOLS], common: &[i32; SYMBOLS]) -> [
     // The largest gives or takes what is left. While there are too many it has `SLOTS / SYMBOLS` at least, so each round takes some.
     let mut over = widths.iter().sum::<i32>() - SLOTS as i32;
     while over != 0 {
-        let most = widths.iter().copied().fold(0, i32::max);
-        let taken = over.min(most / 2);
-        if let Some(width) = widths.iter_mut().find(|width| **width == most) {
-            *width -= taken;
-        }
+        // Size and place of the first of the largest ones in one number.
+        let places = (0..SYMBOLS as i32).rev();
+        let largest = widths
+            .iter()
+            .zip(places)
+            .fold(0, |most, (width, place)| most.max(*width << SYMBOL_BITS | place));
+        let place = SYMBOLS - 1 - largest as usize % SYMBOLS;
+        let taken = over.min((largest >> SYMBOL_BITS) / 2);
+        widths[place % N] -= taken;
         over -= taken;
     }
     widths

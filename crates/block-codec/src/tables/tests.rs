@@ -2,7 +2,9 @@
 
 #![allow(clippy::unwrap_used)]
 
+use super::plan::coded;
 use super::*;
+use crate::rows::LARGEST;
 use proptest::prelude::*;
 
 /// Stretches of rest, walk, steps of one size, and jumps up to the largest index.
@@ -42,8 +44,11 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases.div_ceil(4), ..ProptestConfig::default() })]
 
     #[test]
-    fn indices_return_and_other_lengths_are_refused(indices in pieces()) {
-        let bytes = write(&indices, Vec::new()).unwrap();
+    fn indices_return_and_other_lengths_are_refused(indices in pieces(), order in 0..3_usize, centre in -LARGEST..=LARGEST) {
+        let order = [Order::Values { centre }, Order::First, Order::Second][order];
+        let plan = Plan::of(&coded(order, &indices));
+        let plan = Plan { low: if order == (Order::Values { centre }) { plan.low % 16 } else { plan.low }, ..plan };
+        let bytes = write(&indices, &plan, Vec::new()).unwrap();
         prop_assert!(read(&bytes, indices.len()).unwrap() == indices);
         for more in 1..8 {
             prop_assert!(read(&[bytes.as_slice(), &vec![0; more]].concat(), indices.len()).is_err());
@@ -58,7 +63,7 @@ proptest! {
         damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20),
         rows in prop_oneof![Just(None), (TABLES_ROWS..20_000).prop_map(Some)],
     ) {
-        let mut bytes = write(&indices, Vec::new()).unwrap();
+        let mut bytes = write(&indices, &Plan::new(&indices), Vec::new()).unwrap();
         let rows = rows.unwrap_or(indices.len());
         for (at, value) in damage {
             let at = at.index(bytes.len());
@@ -87,7 +92,7 @@ fn differences_of_every_size_return() {
             let indices: Vec<i64> = (0..2100)
                 .map(|row| if row % rare == 0 { sign(row) } else { 0 })
                 .collect();
-            let bytes = write(&indices, Vec::new()).unwrap();
+            let bytes = write(&indices, &Plan::new(&indices), Vec::new()).unwrap();
             assert!(read(&bytes, indices.len()).unwrap() == indices, "2^{bits}, every {rare}");
         }
     }
@@ -97,7 +102,7 @@ fn differences_of_every_size_return() {
 #[test]
 fn stated_rows_take_no_memory_that_the_bytes_do_not_fill() {
     let indices = vec![5; TABLES_ROWS];
-    let bytes = write(&indices, Vec::new()).unwrap();
+    let bytes = write(&indices, &Plan::new(&indices), Vec::new()).unwrap();
     assert!(bytes.len() < 40, "{}", bytes.len());
     for rows in [TABLES_ROWS + 1, 1 << 20, 1 << 40, usize::MAX] {
         assert!(read(&bytes, rows).is_err(), "{rows}");
@@ -115,7 +120,7 @@ fn hardly_a_flipped_bit_behind_the_counts_is_accepted() {
     let indices: Vec<i64> = (0..3000_u64)
         .map(|row| (((row * row * 2_654_435_761) >> 20) & 7) as i64)
         .collect();
-    let bytes = write(&indices, Vec::new()).unwrap();
+    let bytes = write(&indices, &Plan::new(&indices), Vec::new()).unwrap();
     let mut reader = Bytes(&bytes);
     let warm = (reader.varint().unwrap() >> HEAD_BITS) as usize;
     let from = bytes.len() - reader.0.len() + warm;
@@ -148,7 +153,26 @@ fn independent_symbols_take_little_more_than_their_entropy() {
             index
         }));
         let entropy = -2.0 * up * up.log2() - (1.0 - 2.0 * up) * (1.0 - 2.0 * up).log2();
-        let bits = 8.0 * write(&indices, Vec::new()).unwrap().len() as f64 / rows as f64;
+        let bits = 8.0 * write(&indices, &Plan::new(&indices), Vec::new()).unwrap().len() as f64 / rows as f64;
         assert!(bits > 0.98 * entropy && bits < 1.03 * entropy, "{up}: {bits} for {entropy}");
     }
+}
+
+/// Independent values have differences of more entropy than themselves.
+#[test]
+fn values_without_memory_are_coded_as_values() {
+    let mut state = 7_u64;
+    let indices: Vec<i64> = (0..20_000)
+        .map(|_| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            1000 + (state >> 40) as i64 % 12
+        })
+        .collect();
+    let plan = Plan::new(&indices);
+    assert!(matches!(plan.order, Order::Values { .. }), "{plan:?}");
+    let bits = 8.0 * write(&indices, &plan, Vec::new()).unwrap().len() as f64 / 20_000.0;
+    assert!(bits < 1.02 * 12.0_f64.log2(), "{bits}");
+    assert!((f64::from(plan.bits) / bits - 1.0).abs() < 0.1, "{plan:?} for {bits}");
 }

@@ -49,76 +49,99 @@ pub(super) enum Step {
 
 /// Steps in the order of a reader: lane (2 bits), whether they are raw (1 bit), number of raw bits or start, value or width.
 #[derive(Debug)]
-pub(super) struct Steps(Vec<u32>);
+pub(super) struct Steps {
+    /// As long as there is room, and how many of them there are.
+    all: Vec<u32>,
+    count: usize,
+}
 
 const LANE_SHIFT: u32 = 30;
 const RAW: u32 = 1 << 29;
 
 impl Steps {
-    pub(super) fn with_capacity(steps: usize) -> Self {
-        Self(Vec::with_capacity(steps))
+    pub(super) fn new() -> Self {
+        Self {
+            all: Vec::new(),
+            count: 0,
+        }
+    }
+
+    /// Makes room for so many further steps.
+    pub(super) fn reserve(&mut self, steps: usize) {
+        if self.all.len() < self.count + steps {
+            self.all.resize(2 * self.count + steps, 0);
+        }
     }
 
     pub(super) fn len(&self) -> usize {
-        self.0.len()
+        self.count
     }
 
+    /// Appends a step, for which there must be room.
     #[inline(always)]
     pub(super) fn push(&mut self, lane: usize, step: Step) {
         let step = match step {
             Step::Symbol(part) => part.0,
             Step::Raw { value, bits } => RAW | bits << WORD_BITS | (value & ((1 << bits) - 1)) as u32,
         };
-        self.0.push((lane as u32) << LANE_SHIFT | step);
+        self.all[self.count] = (lane as u32) << LANE_SHIFT | step;
+        self.count += 1;
     }
 
     /// The states of the lanes at the beginning, the words with the last one first, and the number of pads. The steps from `tail_from` on
     /// are those of the tail.
     pub(super) fn encoded(&self, tail_from: usize) -> ([u32; LANES], Vec<u16>, u64) {
-        let (lanes, tail) = self.0.split_at(tail_from);
-        let mut words = Vec::with_capacity(self.0.len() / 4 + 16);
+        let (lanes, tail) = self.all[..self.count].split_at(tail_from);
+        // A step takes at most one word.
+        let (mut words, mut count) = (vec![0; self.count + LANES * PADS], 0);
         let mut state = 1;
         for step in tail.iter().rev() {
-            encode(*step, &mut state, &mut words);
+            encode(*step, &mut state, &mut words, &mut count);
         }
         // The words that the states of the other lanes hold, and a whole state of the first.
         let mut pads = 0;
-        while words.len() < LANES - 1 || state < LOW {
-            encode(RAW | WORD_BITS << WORD_BITS, &mut state, &mut words);
+        while count < LANES - 1 || state < LOW {
+            encode(RAW | WORD_BITS << WORD_BITS, &mut state, &mut words, &mut count);
             pads += 1;
         }
-        let mut held = || LOW | u32::from(words.pop().unwrap_or(0));
-        let mut states = [state, held(), held(), held()];
+        count -= LANES - 1;
+        let held = |place: usize| LOW | u32::from(words[count + place]);
+        let mut states = [state, held(2), held(1), held(0)];
         for step in lanes.iter().rev() {
-            encode(*step, &mut states[(step >> LANE_SHIFT) as usize], &mut words);
+            encode(*step, &mut states[(step >> LANE_SHIFT) as usize], &mut words, &mut count);
         }
+        words.truncate(count);
         (states, words, pads)
     }
 }
 
+/// More than the number of pads of a lane.
+const PADS: usize = 2;
+
 #[inline(always)]
-fn encode(step: u32, state: &mut u32, words: &mut Vec<u16>) {
-    if step & RAW != 0 {
-        let bits = step >> WORD_BITS & 31;
-        // Compared without the shift overflowing at no bits.
-        if u64::from(*state) >= 1 << (u32::BITS - bits) {
-            words.push(*state as u16);
-            *state >>= WORD_BITS;
-        }
-        *state = *state << bits | step & (LOW - 1);
+fn encode(step: u32, state: &mut u32, words: &mut [u16], count: &mut usize) {
+    let (is_raw, bits) = (step & RAW != 0, step >> WORD_BITS & 31);
+    let part = Part(step & (RAW - 1));
+    // Compared in 64 bits: no state reaches the limit of no bits, and that of a part of all slots.
+    let limit = if is_raw {
+        1 << (u32::BITS - bits)
     } else {
-        let part = Part(step & (RAW - 1));
+        u64::from(part.width()) << (u32::BITS - SLOT_BITS)
+    };
+    let is_full = u64::from(*state) >= limit;
+    words[*count] = *state as u16;
+    *count += usize::from(is_full);
+    let x = select_unpredictable(is_full, *state >> WORD_BITS, *state);
+    *state = if is_raw {
+        x << bits | step & (LOW - 1)
+    } else {
         let width = part.width();
-        if *state >= width << (u32::BITS - SLOT_BITS) {
-            words.push(*state as u16);
-            *state >>= WORD_BITS;
-        }
-        *state = (*state / width) << SLOT_BITS | (*state % width + part.start());
-    }
+        (x / width) << SLOT_BITS | (x % width + part.start())
+    };
 }
 
 /// The words that all lanes read in turn.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Words<'a> {
     words: &'a [[u8; 2]],
     position: usize,

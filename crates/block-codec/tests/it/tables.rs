@@ -81,3 +81,75 @@ fn damaged_tables_give_the_stated_rows_or_an_error() {
         assert!(fast(0.05).decode(&bytes, rows).is_err(), "{rows}");
     }
 }
+
+/// Numbers that are on no grid of decimals.
+fn uneven(rows: usize) -> Vec<f64> {
+    let samples = mixed(11, rows);
+    samples
+        .iter()
+        .map(|x| (x * 8.0).round().rem_euclid(40.0).sqrt())
+        .collect()
+}
+
+/// A list of levels with tables: bit 7 of the first byte says that a second one follows, whose bit 6 says so.
+fn has_tabled_levels(bytes: &[u8]) -> bool {
+    [0x20, 0].contains(&(bytes[0] & 0x30)) && bytes[0] & 0x80 != 0 && bytes[1] & 0x40 != 0
+}
+
+#[test]
+fn few_uneven_levels_have_a_list_and_tables() {
+    let samples = uneven(3000);
+    for codec in [BlockCodec::lossless(), BlockCodec::new(1e-9).unwrap()] {
+        let bytes = codec.with_effort(Effort::Fast).encode(&samples).unwrap();
+        assert!(has_tabled_levels(&bytes), "{:?}", &bytes[..2]);
+        let thorough = codec.encode(&samples).unwrap().len();
+        assert!(bytes.len() < thorough * 5 / 4, "{} for {thorough}", bytes.len());
+        let read = codec.decode(&bytes, 3000).unwrap();
+        assert!(
+            read.iter()
+                .zip(&samples)
+                .all(|(value, sample)| (value - sample).abs() <= 1e-9)
+        );
+        // Bit 6 of the first byte would say that other columns are needed; nobody writes it beside tables.
+        let joint = [&[bytes[0] | 0x40], &bytes[1..]].concat();
+        assert!(codec.decode_with(&joint, 3000, &[&samples]).is_err());
+        for damaged in (0..8 * bytes.len()).step_by(5).map(|bit| {
+            let mut flipped = bytes.clone();
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            flipped
+        }) {
+            if let Ok(values) = codec.decode(&damaged, 3000) {
+                assert_eq!(values.len(), 3000);
+            }
+        }
+        for rows in [1, 2047, 2999, 3001, usize::MAX] {
+            assert!(codec.decode(&bytes, rows).is_err(), "{rows}");
+        }
+    }
+}
+
+/// Each signal beside the coding that suits it, at bounds from coarse to lossless.
+#[test]
+fn the_chosen_coding_is_little_longer_than_the_default() {
+    let walk = mixed(4, 8000);
+    let draws: Vec<f64> = (0..8000_u64)
+        .map(|row| (row.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 48) as f64 / 64.0)
+        .collect();
+    let peaks: Vec<f64> = draws.iter().map(|x| if x.fract() < 0.8 { 100.0 } else { *x }).collect();
+    for (name, samples) in [
+        ("walk", &walk),
+        ("draws", &draws),
+        ("peaks", &peaks),
+        ("uneven", &uneven(8000)),
+    ] {
+        for codec in [0.5, 0.02, 1e-4]
+            .map(|bound| BlockCodec::new(bound).unwrap())
+            .into_iter()
+            .chain([BlockCodec::lossless()])
+        {
+            let thorough = codec.encode(samples).unwrap().len();
+            let fast = codec.with_effort(Effort::Fast).encode(samples).unwrap().len();
+            assert!(fast <= thorough * 5 / 4 + 32, "{name}, {codec:?}: {fast} for {thorough}");
+        }
+    }
+}

@@ -192,28 +192,57 @@ fn walk() -> Vec<f64> {
     (0..5000).map(next).collect()
 }
 
+/// Independent draws, which have more entropy as differences.
+fn draws() -> Vec<f64> {
+    let mut state = 5_u32;
+    let next = |_| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from((state >> 8) % 4000) / 16.0
+    };
+    (0..5000).map(next).collect()
+}
+
+/// A walk on few numbers that are on no grid.
+fn levels() -> Vec<f64> {
+    let near = walk().into_iter().map(|x| (x / 64.0).floor().rem_euclid(90.0));
+    near.map(|x| (x * x * x * 1024.0 + x) / 3.0).collect()
+}
+
+type Signal = fn() -> Vec<f64>;
+
+/// Signals whose blocks have tables: of differences, of values, of levels.
+const TABLED: [(&str, Signal, Bound); 3] = [
+    ("v6-tables.fewb", walk, Bound::Absolute(2.0)),
+    ("v6-tables-of-values.fewb", draws, Bound::Absolute(16.0)),
+    ("v6-tables-of-levels.fewb", levels, Bound::Lossless),
+];
+
 /// A single block with tables, which has no identity.
-fn walk_of_tables() -> Vec<u8> {
-    let schema = Schema::new(vec![Column::new("walk", Bound::Absolute(2.0)).unwrap()], TimeBase::Numbered).unwrap();
+fn tabled(signal: Signal, bound: Bound) -> Vec<u8> {
+    let schema = Schema::new(vec![Column::new("walk", bound).unwrap()], TimeBase::Numbered).unwrap();
     let mut recorder = Recorder::new(Vec::new(), schema).with_effort(Effort::Fast);
-    walk().iter().for_each(|x| recorder.push_next(&[Some(*x)]).unwrap());
+    signal().iter().for_each(|x| recorder.push_next(&[Some(*x)]).unwrap());
     recorder.finish().unwrap()
 }
 
 #[test]
 fn version_6_with_tables_keeps_bytes_and_bounds() {
-    let path = file("v6-tables.fewb");
-    assert!(walk_of_tables() == std::fs::read(&path).unwrap());
-    let (_, read, errors) = rows(&path);
-    assert!(errors.is_empty() && read.len() == 5000);
-    let mut pairs = read.iter().zip(walk());
-    assert!(pairs.all(|(row, sample)| (row.values[0].unwrap() - sample).abs() <= 2.0));
+    for (name, signal, bound) in TABLED {
+        let path = file(name);
+        assert!(tabled(signal, bound) == std::fs::read(&path).unwrap(), "{name}");
+        let (schema, read, errors) = rows(&path);
+        assert!(errors.is_empty() && read.len() == 5000, "{name}");
+        let mut pairs = read.iter().zip(signal());
+        assert!(pairs.all(|(row, sample)| schema.columns()[0].keeps(Some(sample), row.values[0], None)), "{name}");
+    }
 }
 
 #[test]
-#[ignore = "writes the file of version 6 with tables anew"]
-fn file_of_tables_is_written() {
-    std::fs::write(file("v6-tables.fewb"), walk_of_tables()).unwrap();
+#[ignore = "writes the files of version 6 with tables anew"]
+fn files_of_tables_are_written() {
+    for (name, signal, bound) in TABLED {
+        std::fs::write(file(name), tabled(signal, bound)).unwrap();
+    }
 }
 
 #[test]

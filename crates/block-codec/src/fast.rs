@@ -1,0 +1,137 @@
+//! Encoding of blocks with [`Effort::Fast`](crate::Effort::Fast): one coding, chosen by its estimated length.
+
+use crate::encode::raw;
+use crate::grid::Grid;
+use crate::head::{Coding, SAMPLES, TABLED, write_head};
+use crate::indices::{LEVEL, to_wrapped_pco, write_block};
+use crate::tables::{self, Plan};
+use crate::{BlockCodec, Effort, Error, levels};
+use pco::DeltaSpec;
+
+/// Bits of a row above which a list of levels is considered, pco on the indices, and codings of the samples themselves.
+const FINE_FOR_LEVELS: f32 = 1.25;
+pub(crate) const FINE: usize = 4;
+const VERY_FINE: f32 = 12.0;
+/// Bits of a level beside those of its distance to the one before.
+const LEVEL_BITS: f32 = 4.0;
+/// Bits of an exception.
+const EXCEPTION_BITS: f32 = 72.0;
+/// Bits per sample up to which counts are tried besides tables: they may be shorter, and are fast.
+const SPARSE: f32 = 1.0;
+
+type Levels = (Vec<u64>, Vec<i64>);
+
+/// A coding of the rows.
+enum Choice {
+    /// Tables, or counts in blocks of few rows.
+    Symbols(Plan),
+    Levels(Levels, Plan),
+    /// pco on differences of this order.
+    Pco(usize),
+}
+
+/// The list of levels, what is coded of their numbers, and bits of a row; `None` if there are too many levels.
+fn few_levels(keys: impl ExactSizeIterator<Item = u64>) -> Option<(Levels, Plan, f32)> {
+    let found = levels::levels(keys, Effort::Fast)?;
+    let (list, numbers) = (&found.0, &found.1);
+    let range = (list[list.len() - 1] - list[0]) as f32;
+    let mean_distance = (range / list.len() as f32).max(1.0);
+    let bits = fewbits_node::elementary::log2(mean_distance) + LEVEL_BITS;
+    let plan = Plan::new(numbers);
+    let bits = plan.bits + bits * list.len() as f32 / numbers.len() as f32;
+    Some((found, plan, bits))
+}
+
+impl BlockCodec {
+    /// As [`encode`](Self::encode), of at least one sample.
+    pub(crate) fn encode_fast(&self, samples: &[f64]) -> Result<Vec<u8>, Error> {
+        let grid = self.grids(samples).into_iter().next();
+        let bytes = match &grid {
+            Some(grid) => self.encode_fast_on(grid, samples)?,
+            None => None,
+        };
+        let bytes = match bytes {
+            Some(bytes) => bytes,
+            None => self.encode_samples(samples)?,
+        };
+        // The byte of the head is not counted.
+        Ok(if bytes.len() > 8 * samples.len() {
+            raw(samples)
+        } else {
+            bytes
+        })
+    }
+
+    /// The samples without a grid.
+    fn encode_samples(&self, samples: &[f64]) -> Result<Vec<u8>, Error> {
+        let keys = samples.iter().map(|sample| levels::key_of_sample(*sample));
+        let found = few_levels(keys).map(|(found, plan, bits)| -> Result<_, Error> {
+            let is_shorter = bits < FINE as f32 || bits < tables::sample_bits(samples)?;
+            Ok(is_shorter.then_some((found, plan)))
+        });
+        if let Some((found, plan)) = found.transpose()?.flatten() {
+            return Ok(if self.is_tabled(samples.len()) {
+                levels::write_tabled(vec![SAMPLES | 128, TABLED], &found, &plan)?
+            } else {
+                levels::write(vec![SAMPLES], false, &found, None)?
+            });
+        }
+        let numbers = to_wrapped_pco(samples, &DeltaSpec::default(), LEVEL)?;
+        Ok(numbers.map_or_else(|| raw(samples), |numbers| [&[SAMPLES | 3 << 4], numbers.as_slice()].concat()))
+    }
+
+    /// The block on a grid; `None` if samples without one are shorter.
+    fn encode_fast_on(&self, grid: &Grid, samples: &[f64]) -> Result<Option<Vec<u8>>, Error> {
+        let (indices, exceptions) = self.indices(grid, samples);
+        let is_tabled = self.is_tabled(samples.len());
+        let plan = if is_tabled {
+            Plan::new(&indices)
+        } else {
+            Plan::of_differences(&indices)
+        };
+        let (plain, mut least, mut choice) = (plan.bits, plan.bits, Choice::Symbols(plan));
+        if plain > FINE_FOR_LEVELS {
+            let keys = indices.iter().map(|index| levels::key_of_index(*index));
+            if let Some((found, plan, bits)) = few_levels(keys).filter(|(.., bits)| *bits < least) {
+                (least, choice) = (bits, Choice::Levels(found, plan));
+            }
+        }
+        if plain > FINE as f32 {
+            let (order, bits) = tables::pco_order(&indices);
+            if bits < least {
+                (least, choice) = (bits, Choice::Pco(order));
+            }
+        }
+        least += EXCEPTION_BITS * exceptions.len() as f32 / samples.len() as f32;
+        if least > VERY_FINE && tables::sample_bits(samples)? < least {
+            return Ok(None);
+        }
+        let head = |coding| {
+            let mut bytes = Vec::new();
+            write_head(grid, coding, false, &exceptions, &mut bytes);
+            bytes
+        };
+        let counted = || write_block(false, grid, &indices, &exceptions, None);
+        Ok(Some(match choice {
+            Choice::Symbols(plan) if is_tabled => {
+                let bytes = tables::write(&indices, &plan, head(Coding::Tables))?;
+                let bits = 8.0 * bytes.len() as f32 / samples.len() as f32;
+                let other = if bits <= SPARSE { Some(counted()?) } else { None };
+                other.filter(|other| other.len() < bytes.len()).unwrap_or(bytes)
+            }
+            Choice::Symbols(_) => counted()?,
+            Choice::Levels(found, plan) if is_tabled => {
+                levels::write_tabled(head(Coding::TabledLevels), &found, &plan)?
+            }
+            Choice::Levels(found, _) => levels::write(head(Coding::Levels), false, &found, None)?,
+            Choice::Pco(order) => {
+                let mut bytes = head(Coding::Wrapped);
+                match to_wrapped_pco(&indices, &DeltaSpec::TryConsecutive(order), LEVEL)? {
+                    Some(numbers) => bytes.extend(numbers),
+                    None => bytes = counted()?,
+                }
+                bytes
+            }
+        }))
+    }
+}
