@@ -122,7 +122,7 @@ pub(crate) fn fit(
     let (rows, _) = instants::of(&given, time, long, &seats, None)?;
     let rows = rows
         .iter()
-        .map(|row| readings(row, &is_bits, &names))
+        .map(|row| readings(&row, &is_bits, &names))
         .collect::<Outcome<Vec<_>>>()?;
     let interrupted = Mutex::new(None);
     let watch = || match Python::attach(|py| py.check_signals()) {

@@ -2,10 +2,11 @@
 
 use crate::error::{Outcome, refused};
 use crate::seat::{Missing, Seat};
-use crate::table::{Given, Origin};
+use crate::table::{Cells, Given, Origin};
 use smallvec::SmallVec;
 
 /// All samples of one time.
+#[derive(Clone)]
 pub(crate) struct Instant {
     pub(crate) seconds: f64,
     /// The first row of the table with this time.
@@ -21,9 +22,43 @@ pub(crate) struct Long<'a> {
 }
 
 /// What a cell says of its sensor; nothing if the cell is missing (null, or not finite) and its sensor was not due.
-pub(crate) fn sample(number: usize, seat: &Seat, cell: Option<f64>) -> Option<(usize, Option<f64>)> {
+pub(crate) fn sample(number: usize, missing: Missing, cell: Option<f64>) -> Option<(usize, Option<f64>)> {
     let cell = cell.filter(|x| x.is_finite());
-    (cell.is_some() || seat.missing == Missing::Silence).then_some((number, cell))
+    (cell.is_some() || missing == Missing::Silence).then_some((number, cell))
+}
+
+/// The instants of a table, in its order.
+pub(crate) enum Instants {
+    /// One a row, made when it is asked for: of many rows they would take more memory than the table.
+    Wide {
+        seconds: Vec<f64>,
+        columns: Vec<(Cells, Missing)>,
+    },
+    Long(Vec<Instant>),
+}
+
+impl Instants {
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::Wide { seconds, .. } => seconds.len(),
+            Self::Long(instants) => instants.len(),
+        }
+    }
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = Instant> {
+        (0..self.len()).map(|row| match self {
+            Self::Wide { seconds, columns } => {
+                let cells = columns.iter().enumerate();
+                let samples = cells.filter_map(|(number, (cells, missing))| sample(number, *missing, cells[row]));
+                Instant {
+                    seconds: seconds[row],
+                    row,
+                    samples: samples.collect(),
+                }
+            }
+            Self::Long(instants) => instants[row].clone(),
+        })
+    }
 }
 
 /// The instants of a table, in its order.
@@ -33,37 +68,29 @@ pub(crate) fn of(
     long: Option<Long<'_>>,
     seats: &[Seat],
     origin: Option<Origin>,
-) -> Outcome<(Vec<Instant>, Option<Origin>)> {
+) -> Outcome<(Instants, Option<Origin>)> {
     let times = given.times(time)?;
     let Some(origin) = origin.or_else(|| times.origin()) else {
-        return Ok((Vec::new(), None));
+        return Ok((Instants::Long(Vec::new()), None));
     };
     let seconds = times.since(origin)?;
-    let mut instants: Vec<Instant> = Vec::new();
-    match long {
+    let instants = match long {
         None => {
-            let columns = seats
-                .iter()
-                .map(|seat| given.numbers(&seat.name))
-                .collect::<Outcome<Vec<_>>>()?;
-            for (row, seconds) in seconds.into_iter().enumerate() {
-                let cells = columns.iter().zip(seats).enumerate();
-                let samples = cells.filter_map(|(number, (cells, seat))| sample(number, seat, cells[row]));
-                instants.push(Instant {
-                    seconds,
-                    row,
-                    samples: samples.collect(),
-                });
+            let columns = seats.iter().map(|seat| Ok((given.numbers(&seat.name)?, seat.missing)));
+            Instants::Wide {
+                seconds,
+                columns: columns.collect::<Outcome<_>>()?,
             }
         }
         Some(Long { by, value }) => {
+            let mut instants: Vec<Instant> = Vec::new();
             let (names, cells) = (given.texts(by)?, given.numbers(value)?);
             for (row, ((seconds, name), cell)) in seconds.into_iter().zip(names).zip(cells).enumerate() {
                 let Some(seat) = seats.iter().position(|seat| seat.name == name) else {
                     let known: Vec<&str> = seats.iter().map(|seat| seat.name.as_str()).collect();
                     return refused("by", format!("'{name}' in row {row}"), format!("one of {}", known.join(", ")));
                 };
-                let sample = sample(seat, &seats[seat], cell);
+                let sample = sample(seat, seats[seat].missing, cell);
                 match instants.last_mut() {
                     // A second sample of a sensor at one time is an instant of its own.
                     Some(last) if last.seconds == seconds && last.samples.iter().all(|(other, _)| *other != seat) => {
@@ -76,7 +103,8 @@ pub(crate) fn of(
                     }),
                 }
             }
+            Instants::Long(instants)
         }
-    }
+    };
     Ok((instants, Some(origin)))
 }

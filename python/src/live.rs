@@ -1,7 +1,7 @@
 //! The library's centre, whatever the number of coordinates of its state.
 
 use crate::error::Outcome;
-use crate::instants::Instant;
+use crate::instants::{Instant, Instants};
 use crate::model::with_dimension;
 use crate::parts::Parts;
 use crate::seat::Seat;
@@ -20,7 +20,7 @@ pub(crate) trait Live: Send + Sync {
     fn step(&mut self, instant: &Instant) -> Outcome<Row>;
 
     /// All instants, one after the other. Ctrl-C is heard.
-    fn run(&mut self, instants: &[Instant], smooth: Smooth) -> Outcome<Rows>;
+    fn run(&mut self, instants: &Instants, smooth: Smooth) -> Outcome<Rows>;
 
     /// Mean and rows of the covariance.
     fn moments(&self) -> (Vec<f64>, Vec<Vec<f64>>);
@@ -51,7 +51,7 @@ impl<const D: usize> Live for Built<D> {
         done
     }
 
-    fn run(&mut self, instants: &[Instant], smooth: Smooth) -> Outcome<Rows> {
+    fn run(&mut self, instants: &Instants, smooth: Smooth) -> Outcome<Rows> {
         let before = self.state();
         let done = over(self, instants, smooth);
         if done.is_err() {
@@ -76,7 +76,7 @@ impl<const D: usize> Live for Built<D> {
     }
 }
 
-fn over<const D: usize>(built: &mut Built<D>, instants: &[Instant], smooth: Smooth) -> Outcome<Rows> {
+fn over<const D: usize>(built: &mut Built<D>, instants: &Instants, smooth: Smooth) -> Outcome<Rows> {
     let mut rows = Rows::new::<D>(instants.len());
     let mut trail = Vec::new();
     for (number, instant) in instants.iter().enumerate() {
@@ -84,7 +84,7 @@ fn over<const D: usize>(built: &mut Built<D>, instants: &[Instant], smooth: Smoo
             Python::attach(|py| py.check_signals())?;
         }
         let from = built.time();
-        let (scale, row): (f64, Row) = (built.noise_scale(), Built::step(built, instant)?);
+        let (scale, row): (f64, Row) = (built.noise_scale(), Built::step(built, &instant)?);
         rows.push(&built.belief(), row);
         if smooth != Smooth::No {
             trail.push(built.mark(from, scale, rows.restarted()));

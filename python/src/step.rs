@@ -6,7 +6,8 @@ use crate::model::{Moves, Remembering};
 use crate::parts::Parts;
 use crate::seat::{Seat, Sends};
 use crate::table::{Table, doubles};
-use arrow_array::{ArrayRef, Int64Array, StringArray};
+use arrow_array::builder::StringBuilder;
+use arrow_array::{ArrayRef, Int64Array};
 use fewbits_core::{BitString, Gaussian, Observation, SensorNode};
 use fewbits_filters::centre::{CentreState, Event, Failures, FusionCentre, NoiseLearning, Slot};
 use fewbits_filters::smoother::smooth_step;
@@ -287,7 +288,7 @@ pub(crate) struct Rows {
     states: Vec<Vec<f64>>,
     log_likelihoods: Vec<f64>,
     bits: Vec<i64>,
-    events: Vec<String>,
+    events: StringBuilder,
     restarted: bool,
     pub(crate) smoothed: Option<Vec<Vec<f64>>>,
 }
@@ -298,7 +299,7 @@ impl Rows {
             states: vec![Vec::with_capacity(rows); 2 * D],
             log_likelihoods: Vec::with_capacity(rows),
             bits: Vec::with_capacity(rows),
-            events: Vec::with_capacity(rows),
+            events: StringBuilder::with_capacity(rows, 0),
             restarted: false,
             smoothed: None,
         }
@@ -315,7 +316,7 @@ impl Rows {
             .events
             .iter()
             .any(|event| event == "reopened" || event == "reacquired");
-        self.events.push(row.events.join("; "));
+        self.events.append_value(row.events.join("; "));
     }
 
     /// Whether the last belief does not follow from the one before.
@@ -323,7 +324,7 @@ impl Rows {
         self.restarted
     }
 
-    pub(crate) fn table(self, time: &str, times: ArrayRef) -> Outcome<Table> {
+    pub(crate) fn table(mut self, time: &str, times: ArrayRef) -> Outcome<Table> {
         let mut columns: Vec<(String, ArrayRef)> = vec![(time.to_owned(), times)];
         let named = |columns: &mut Vec<(String, ArrayRef)>, end: &str, states: Vec<Vec<f64>>| {
             for (i, state) in states.into_iter().enumerate() {
@@ -334,7 +335,7 @@ impl Rows {
         named(&mut columns, "", self.states);
         columns.push(("log_likelihood".to_owned(), doubles(self.log_likelihoods)));
         columns.push(("bits".to_owned(), Arc::new(Int64Array::from(self.bits))));
-        columns.push(("events".to_owned(), Arc::new(StringArray::from(self.events))));
+        columns.push(("events".to_owned(), Arc::new(self.events.finish())));
         if let Some(smoothed) = self.smoothed {
             named(&mut columns, "_smooth", smoothed);
         }

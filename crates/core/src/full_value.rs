@@ -16,7 +16,8 @@ use rand::Rng;
 /// There is no factor for a link that inverts bits: a value with inverted bits has no useful likelihood. Protect it by a checksum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FullValue {
-    noise_variance: f64,
+    /// The likelihood of a value of 0.
+    of_zero: Value<1>,
     format: NumberFormat,
 }
 
@@ -27,7 +28,7 @@ impl FullValue {
     /// If the variance is not above 0.
     pub fn new(noise_variance: f64) -> Result<Self, ArgumentError> {
         Ok(Self {
-            noise_variance: positive("noise_variance", noise_variance)?,
+            of_zero: Value::scalar(0.0, positive("noise_variance", noise_variance)?)?,
             format: NumberFormat::Double,
         })
     }
@@ -41,7 +42,7 @@ impl FullValue {
 
 impl MeasurementNoise<1> for FullValue {
     fn noise_covariance_at(&self, _: &Vector1<f64>) -> Matrix1<f64> {
-        Matrix1::new(self.noise_variance)
+        *self.of_zero.noise_covariance()
     }
 }
 
@@ -69,8 +70,11 @@ impl Scheme<1> for FullValue {
         };
         // A value with inverted bits has no useful likelihood.
         within("crossover", link.crossover(), 0.0, 0.0)?;
-        finite("report", *value)?;
-        let value = Value::scalar(*value, self.noise_variance)?;
-        Ok(value.times_exp(link.of_received()?.ln())?.into())
+        let value = self.of_zero.of_value([finite("report", *value)?].into());
+        let log_arrival = match link.of_received()? {
+            1.0 => 0.0,
+            arrival => arrival.ln(),
+        };
+        Ok(value.times_exp(log_arrival)?.into())
     }
 }

@@ -253,6 +253,12 @@ impl<const D: usize> FactoredGaussian<D> {
         &self.lower
     }
 
+    /// The same about another mean, which is finite.
+    pub(crate) fn with_mean(self, mean: SVector<f64, D>) -> Self {
+        let gaussian = Gaussian { mean, ..self.gaussian };
+        Self { gaussian, ..self }
+    }
+
     /// `ln` of the density at the mean.
     pub(crate) fn log_peak(&self) -> f64 {
         self.log_peak

@@ -52,6 +52,12 @@ impl<const M: usize> Value<M> {
         Ok(Self { log_scale, ..self })
     }
 
+    /// The same noise about another value, which is finite.
+    pub(crate) fn of_value(self, value: SVector<f64, M>) -> Self {
+        let noise = self.noise.with_mean(value);
+        Self { noise, ..self }
+    }
+
     /// Observed value `z`.
     pub fn value(&self) -> &SVector<f64, M> {
         self.noise.mean()

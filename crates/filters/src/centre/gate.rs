@@ -3,7 +3,7 @@
 use super::FusionCentre;
 use super::health::Health;
 use super::law::Law;
-use super::reading::{Content, Reading, Tested};
+use super::reading::{BySlot, Content, Reading, Tested};
 use crate::contract::StateFilter;
 use fewbits_core::Gaussian;
 
@@ -43,7 +43,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     ///     the one that fits worst is rejected, and the others are tested again without it
     ///     if another fits about as badly, and without each other they agree with everything else about equally well, both are contested
     /// ```
-    pub(super) fn gate(&self, law: &Law<D>, predicted: &Gaussian<D>, readings: &[Reading<'_, D>]) -> Vec<Verdict> {
+    pub(super) fn gate(&self, law: &Law<D>, predicted: &Gaussian<D>, readings: &[Reading<'_, D>]) -> BySlot<Verdict> {
         let state = |reading: &Reading<'_, D>| &self.members[reading.seat].state;
         let first = |reading: &Reading<'_, D>| match (&reading.likelihood, state(reading).is_ignored()) {
             (None, _) => Fate::Rejected,
@@ -54,7 +54,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             fate: first(reading),
             tested: Tested::without_residual(true),
         };
-        let mut verdicts: Vec<Verdict> = readings.iter().map(of).collect();
+        let mut verdicts: BySlot<Verdict> = readings.iter().map(of).collect();
         if self.health == Health::Off {
             return verdicts;
         }
@@ -166,7 +166,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         predicted: &Gaussian<D>,
         readings: &[Reading<'_, D>],
         verdicts: &[Verdict],
-    ) -> Option<(Gaussian<D>, Vec<Verdict>)> {
+    ) -> Option<(Gaussian<D>, BySlot<Verdict>)> {
         let reports = |wanted: fn(Fate) -> bool, verdicts: &[Verdict]| {
             let those = readings.iter().zip(verdicts).filter(|(reading, verdict)| {
                 reading.content == Content::Report && reading.likelihood.is_some() && wanted(verdict.fate)

@@ -1,7 +1,8 @@
 //! Updates of presence, health and process noise after the observations of one instant.
 
-use super::gate::Fate;
+use super::gate::{Fate, Verdict};
 use super::health::{self, Alarm, CLIP, Health, Residual, SEQUENCES};
+use super::reading::{Content, Reading};
 use super::repeats::Repeated;
 use super::{Event, FusionCentre};
 use crate::Error;
@@ -24,17 +25,6 @@ const MAX_DEPTH: f64 = 1e3;
 /// Mean depth of the reports of a right model: half a squared standard normal variable.
 const USUAL_DEPTH: f64 = 0.5;
 
-/// What one slot shows about its sensor.
-pub(super) struct Watched {
-    pub seat: usize,
-    pub fate: Fate,
-    /// The residual of a report given the prediction and all other reports that are used.
-    pub apart: Option<Residual>,
-    /// The value that it is, and the variance of its noise.
-    pub value: Option<(f64, f64)>,
-    pub shown: Shown,
-}
-
 /// What came in a slot.
 pub(super) enum Shown {
     /// Nothing, and the probability of that if the sensor works.
@@ -45,21 +35,21 @@ pub(super) enum Shown {
 
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// Updates presence, health and learnt process noise from what each slot showed.
-    pub(super) fn judge(&mut self, rng: &mut dyn Rng, watched: &[Watched]) -> Result<Vec<Event>, Error> {
+    pub(super) fn judge(
+        &mut self,
+        rng: &mut dyn Rng,
+        readings: &[Reading<'_, D>],
+        verdicts: &[Verdict],
+        shown: &[Shown],
+    ) -> Result<Vec<Event>, Error> {
         // 1. Each sensor: its presence and its own test.
         let mut events = Vec::new();
         let mut pooled = [(0.0, 0_u32); SEQUENCES];
         let (mut products, mut together, mut is_any_used, mut is_any_rejected) = (0.0, 0.0, false, false);
         let (mut alarmed, mut repeating) = (Vec::new(), Vec::new());
-        for Watched {
-            seat,
-            fate,
-            apart,
-            value,
-            shown,
-        } in watched
-        {
-            let member = &mut self.members[*seat];
+        for ((reading, Verdict { fate, tested }), shown) in readings.iter().zip(verdicts).zip(shown) {
+            let (seat, apart) = (reading.seat, &tested.residual);
+            let member = &mut self.members[seat];
             let (number, state) = (member.number, &mut member.state);
             let in_order = match shown {
                 Shown::Silence(silence) => {
@@ -89,9 +79,10 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             if self.health == Health::Off {
                 continue;
             }
-            if let Some((value, variance)) = value {
-                match state.repeats.add(*value, *variance, self.limits.rate) {
-                    Repeated::Suspect if !state.repeats.is_stuck => repeating.push(*seat),
+            let is_report = reading.content == Content::Report;
+            if let Some((value, variance)) = is_report.then(|| member.sensor.value(reading.slot)).flatten() {
+                match state.repeats.add(value, variance, self.limits.rate) {
+                    Repeated::Suspect if !state.repeats.is_stuck => repeating.push(seat),
                     Repeated::MovesAgain if !state.excluded => {
                         state.forget_tests();
                         events.push(Event::Readmitted(number));
@@ -142,7 +133,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 state.disputed = false;
             }
             if is_alarm {
-                alarmed.push((*seat, *fate));
+                alarmed.push((seat, *fate));
             }
             // The centre's own test leaves out residuals: in a lost track those of different sensors have different signs.
             // Surprises and products do not.

@@ -104,6 +104,8 @@ impl Presence {
 
 /// Probability that a common failure destroys a given sensor.
 const TAKEN: f64 = 0.5;
+/// The smallest probability of a common failure: log odds of -700.
+const LOWEST: f64 = 9.859_676_543_759_77e-305;
 /// Above this probability a common failure is treated as certain, and the next one can occur.
 const SETTLED: f64 = 0.999;
 
@@ -124,7 +126,11 @@ impl Outage {
         failures: &Failures,
         sensors: impl Iterator<Item = &'a mut Presence>,
     ) {
-        let survives = (-failures.rate * seconds).exp();
+        let survives = if failures.rate == 0.0 {
+            1.0
+        } else {
+            (-failures.rate * seconds).exp()
+        };
         let new = (1.0 - self.0) * (1.0 - survives);
         let total = self.0 + new;
         for sensor in sensors {
@@ -141,8 +147,10 @@ impl Outage {
     /// Updates with the sum of the log likelihood ratios of all sensors of one instant.
     pub(crate) fn weigh<'a>(&mut self, log_ratio: f64, sensors: impl Iterator<Item = &'a mut Presence>) {
         // The log odds are limited so that the probability differs from 0 and 1.
-        let odds = ((self.0 / (1.0 - self.0)).ln() + log_ratio).clamp(-700.0, 700.0).exp();
-        self.0 = odds / (1.0 + odds);
+        if !(self.0 == LOWEST && log_ratio <= 0.0) {
+            let odds = ((self.0 / (1.0 - self.0)).ln() + log_ratio).clamp(-700.0, 700.0).exp();
+            self.0 = odds / (1.0 + odds);
+        }
         // A certain common failure becomes part of each sensor's own probability, and the next one can be found.
         let settled = self.0 > SETTLED;
         for sensor in sensors {

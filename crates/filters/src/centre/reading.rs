@@ -7,9 +7,13 @@ use crate::Error;
 use crate::contract::StateFilter;
 use fewbits_core::{BitString, Evidence, Gaussian, Likelihood, Observation};
 use fewbits_numerics::normal::log_interval;
+use smallvec::SmallVec;
 
 /// Reports of at most this many bits are treated as words; the residual then sums over all possible words.
 const WORD_BITS: usize = 4;
+
+/// A list with one entry a slot of an instant. Most instants have few slots: then nothing is allocated.
+pub(super) type BySlot<T> = SmallVec<[T; 2]>;
 
 /// A slot of a sensor that has joined.
 pub(super) struct Reading<'a, const D: usize> {
@@ -74,22 +78,15 @@ impl Tested {
 
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// The slots in the order of the sensors' numbers, without copies of reports; and the seats whose reports were copied.
-    pub(super) fn read<'a>(&self, slots: &'a [Slot]) -> Result<(Vec<Reading<'a, D>>, Vec<usize>), Error> {
-        let mut seated = Vec::with_capacity(slots.len());
+    pub(super) fn read<'a>(&self, slots: &'a [Slot]) -> Result<(BySlot<Reading<'a, D>>, Vec<usize>), Error> {
+        let mut seated: BySlot<(usize, &'a Slot)> = BySlot::new();
         let mut next_seat = 0;
         for slot in slots {
             let seat = self.seated(slot.sensor, next_seat)?;
             next_seat = seat + 1;
             seated.push((seat, slot));
         }
-        // A sensor may have several slots. Their order must not matter either.
-        let key = |(seat, slot): &(usize, &'a Slot)| {
-            let bits = slot.observation.received().map(|bits| (bits.bits(), bits.bytes()));
-            (*seat, bits, slot.observation == Observation::Lost, slot.feedback.bytes())
-        };
-        if !seated.is_sorted_by(|one, next| key(one) < key(next)) {
-            seated.sort_by(|one, next| key(one).cmp(&key(next)));
-        }
+        sort(&mut seated);
         let mut copied = Vec::new();
         seated.dedup_by(|next, one| {
             let is_copy = next.0 == one.0 && next.1 == one.1 && one.1.observation.received().is_some();
@@ -117,6 +114,17 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 self.test_apart(&conditioned(given, left), right, found);
             }
         }
+    }
+}
+
+/// Sorts slots by their seats. A sensor may have several slots, whose order must not matter either.
+fn sort(seated: &mut [(usize, &Slot)]) {
+    fn key<'a>((seat, slot): &(usize, &'a Slot)) -> impl Ord + use<'a> {
+        let bits = slot.observation.received().map(|bits| (bits.bits(), bits.bytes()));
+        (*seat, bits, slot.observation == Observation::Lost, slot.feedback.bytes())
+    }
+    if !seated.is_sorted_by(|one, next| key(one) < key(next)) {
+        seated.sort_by(|one, next| key(one).cmp(&key(next)));
     }
 }
 

@@ -2,10 +2,10 @@
 
 use super::gate::{Fate, Verdict};
 use super::health::Health;
-use super::judge::{Shown, Watched};
+use super::judge::Shown;
 use super::law::Law;
 use super::one_wrong::OneIsWrong;
-use super::reading::{Content, Reading};
+use super::reading::{BySlot, Content, Reading};
 use super::state::{MemberState, StoredSlot};
 use super::{Event, FusionCentre, Received, Slot};
 use crate::Error;
@@ -61,23 +61,26 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         let sent = readings.iter().filter(|reading| reading.content != Content::Nothing);
         info.log_likelihood += sent
             .map(|reading| self.members[reading.seat].state.presence.working)
-            .map(|working| working.max(f64::MIN_POSITIVE).ln())
+            .map(|working| {
+                if working == 1.0 {
+                    0.0
+                } else {
+                    working.max(f64::MIN_POSITIVE).ln()
+                }
+            })
             .sum::<f64>();
         let is_rejected = |verdict: &Verdict| verdict.fate == Fate::Rejected;
         if self.health != Health::Exclude && verdicts.iter().any(is_rejected) {
             info.log_likelihood = f64::NEG_INFINITY;
         }
         // From here on the centre changes. Only the restart of a lost track can fail; then everything is put back.
-        let earlier: (Vec<MemberState>, _, _, _, _, _) = (
-            self.members.iter().map(|member| member.state).collect(),
-            self.outage,
-            self.monitor,
-            self.noise_scale,
-            self.astray,
-            std::mem::replace(&mut self.alternative, alternative),
-        );
-        let earlier_history = self.acquisition.map(|_| self.history.clone());
-        let earlier_belief = std::mem::replace(&mut self.belief, belief);
+        let earlier = self.acquisition.map(|_| {
+            let states: Vec<MemberState> = self.members.iter().map(|member| member.state).collect();
+            let rest = (self.outage, self.monitor, self.noise_scale, self.astray, self.alternative);
+            (states, rest, self.history.clone(), self.belief.clone())
+        });
+        self.alternative = alternative;
+        self.belief = belief;
         if let Some(before) = before {
             let stored = readings
                 .iter()
@@ -99,35 +102,20 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 Event::Reopened
             });
         }
-        let watched: Vec<Watched> = readings
-            .iter()
-            .zip(&verdicts)
-            .zip(in_order.shown)
-            .map(|((reading, verdict), shown)| Watched {
-                seat: reading.seat,
-                fate: verdict.fate,
-                apart: verdict.tested.residual,
-                value: (reading.content == Content::Report && self.health != Health::Off)
-                    .then(|| self.members[reading.seat].sensor.value(reading.slot))
-                    .flatten(),
-                shown,
-            })
-            .collect();
-        match self.judge(rng, &watched) {
+        match self.judge(rng, &readings, &verdicts, &in_order.shown) {
             Ok(found) => {
                 events.extend(found);
                 Ok(Received { info, events })
             }
             Err(error) => {
-                let (states, outage, monitor, noise_scale, astray, alternative) = earlier;
-                self.members
-                    .iter_mut()
-                    .zip(states)
-                    .for_each(|(member, state)| member.state = state);
-                (self.outage, self.monitor, self.noise_scale, self.astray) = (outage, monitor, noise_scale, astray);
-                self.alternative = alternative;
-                self.belief = earlier_belief;
-                self.history = earlier_history.unwrap_or_default();
+                if let Some((states, rest, history, belief)) = earlier {
+                    self.members
+                        .iter_mut()
+                        .zip(states)
+                        .for_each(|(member, state)| member.state = state);
+                    (self.outage, self.monitor, self.noise_scale, self.astray, self.alternative) = rest;
+                    (self.history, self.belief) = (history, belief);
+                }
                 Err(error)
             }
         }
@@ -156,7 +144,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         let mut found = InOrder {
             given: *predicted,
             log_likelihood: 0.0,
-            shown: Vec::with_capacity(readings.len()),
+            shown: BySlot::new(),
         };
         let mut before: Vec<&Reading<'_, D>> = Vec::new();
         let mut silence = None;
@@ -252,16 +240,18 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             .chain(missing)
             .collect();
         let is_used = |i: &usize| verdicts[*i].fate == Fate::Used && readings[*i].content != Content::Nothing;
-        let mut reports: Vec<usize> = (0..readings.len()).filter(is_used).collect();
-        let used: Vec<&Reading<'_, D>> = reports.iter().map(|i| &readings[*i]).collect();
-        let parts_of_reports = self.joined(used.iter().map(|one| self.input_of(one)))?;
-        let together = self.likelihoods(&used, &parts_of_reports);
+        let reports = (0..readings.len()).filter(is_used);
+        let parts_of_reports = self.joined(reports.clone().map(|i| self.input_of(&readings[i])))?;
+        let together = || {
+            let used: Vec<&Reading<'_, D>> = reports.clone().map(|i| &readings[i]).collect();
+            self.likelihoods(&used, &parts_of_reports)
+        };
         if self.filter.of_moments(&in_order.given).is_some() {
             let (mut moments, mut log_likelihood) = (in_order.given, in_order.log_likelihood);
             // The reports of a group, at once in place of one after the other.
             let mut all = *predicted;
             if !parts_of_reports.is_empty()
-                && let Ok(found) = together.as_slice().condition(&mut all)
+                && let Ok(found) = together().as_slice().condition(&mut all)
                 && all.is_finite()
             {
                 (moments, log_likelihood) = (all, found.log_likelihood);
@@ -282,18 +272,14 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             let reports = reports.iter().filter_map(|i| readings[*i].known());
             reports.chain(rest.iter().copied()).collect::<Vec<_>>()
         };
-        let at_once: Vec<&dyn Likelihood<D>> = together.iter().chain(&rest).copied().collect();
+        let at_once: Vec<&dyn Likelihood<D>> = together().iter().chain(&rest).copied().collect();
+        let mut reports: Vec<usize> = reports.collect();
         match self.filter.update(rng, belief, &at_once) {
             Err(error) if is_of_reports(&error) => {}
             other => return other,
         }
         // Together they are impossible, or overflow. Those that fit best are kept, as many as are possible together.
-        reports.sort_by(|one, other| {
-            verdicts[*one]
-                .tested
-                .depth()
-                .total_cmp(&verdicts[*other].tested.depth())
-        });
+        sort_by_depth(&mut reports, verdicts);
         let mut kept: Vec<usize> = Vec::new();
         for i in reports {
             kept.push(i);
@@ -316,6 +302,12 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     }
 }
 
+/// Sorts reports by how well they fit, the best first.
+fn sort_by_depth(reports: &mut [usize], verdicts: &[Verdict]) {
+    let depth = |report: &usize| verdicts[*report].tested.depth();
+    reports.sort_by(|one, other| depth(one).total_cmp(&depth(other)));
+}
+
 /// Whether a belief may fail like this because of the reports.
 pub(super) fn is_of_reports(error: &Error) -> bool {
     matches!(error, Error::Impossible | Error::NotANumber { .. })
@@ -325,7 +317,7 @@ pub(super) fn is_of_reports(error: &Error) -> bool {
 struct InOrder<const D: usize> {
     given: Gaussian<D>,
     log_likelihood: f64,
-    shown: Vec<Shown>,
+    shown: BySlot<Shown>,
 }
 
 /// The likelihood of all reports that contradict each other.

@@ -279,26 +279,12 @@ where
     }
 
     fn together(&self, counted: &[(&Slot, usize)], working: f64) -> Result<Option<Box<dyn Likelihood<D>>>, Error> {
-        let (mut product, mut log_scale) = (Product::new(), 0.0);
-        for (slot, count) in counted {
+        let scalar = |slot: &Slot| {
             let factor = self.observed(slot, working)?.factor.as_scalar();
-            // Values are exact one after the other.
-            let Some(scalar) = factor.filter(|scalar| M == 1 && !matches!(scalar, Scalar::Value(_))) else {
-                return Ok(None);
-            };
-            let constant = match &scalar {
-                Scalar::Levels(levels) => levels.as_constant(),
-                Scalar::Value(_) => None,
-            };
-            match constant {
-                Some(log) => log_scale += *count as f64 * log,
-                None => product.push_repeated(Repeated::new(scalar, *count)?),
-            }
-        }
-        if product.factors().is_empty() {
-            return Ok(None);
-        }
-        Ok(Some(Box::new(Observed::new(self.sensing.clone(), Joint { product, log_scale }))))
+            Ok(factor.filter(|_| M == 1))
+        };
+        let joint = Joint::new(counted, &scalar)?;
+        Ok(joint.map(|joint| Box::new(Observed::new(self.sensing.clone(), joint)) as Box<dyn Likelihood<D>>))
     }
 
     fn measured(&self, state: &SVector<f64, D>) -> Option<f64> {
@@ -310,6 +296,27 @@ where
 struct Joint {
     product: Product,
     log_scale: f64,
+}
+
+impl Joint {
+    /// Of several slots with their counts. `None` if there is nothing to multiply.
+    fn new(
+        counted: &[(&Slot, usize)],
+        scalar: &dyn Fn(&Slot) -> Result<Option<Scalar>, Error>,
+    ) -> Result<Option<Self>, Error> {
+        let (mut product, mut log_scale) = (Product::new(), 0.0);
+        for (slot, count) in counted {
+            let Some(Scalar::Levels(levels)) = scalar(slot)? else {
+                // Values are exact one after the other.
+                return Ok(None);
+            };
+            match levels.as_constant() {
+                Some(log) => log_scale += *count as f64 * log,
+                None => product.push_repeated(Repeated::new(Scalar::Levels(levels), *count)?),
+            }
+        }
+        Ok((!product.factors().is_empty()).then_some(Self { product, log_scale }))
+    }
 }
 
 impl<const M: usize> Factor<M> for Joint {

@@ -7,6 +7,7 @@ use super::repeats::Repeats;
 use super::{FusionCentre, Slot};
 use crate::Error;
 use crate::contract::StateFilter;
+use ciborium::Value;
 use fewbits_core::{BitString, Observation};
 use fewbits_numerics::error::{finite, positive, refuse};
 use serde::de::DeserializeOwned;
@@ -147,15 +148,43 @@ pub struct CentreState<B> {
     alternative: Option<StoredAlternative>,
 }
 
+impl<B> CentreState<B> {
+    /// The same state with the beliefs in another form.
+    fn map<C, E>(&self, form: impl Fn(&B) -> Result<C, E>) -> Result<CentreState<C>, E> {
+        let checkpoint = |one: &Checkpoint<B>| {
+            Ok(Checkpoint {
+                time: one.time,
+                belief: form(&one.belief)?,
+                slots: one.slots.clone(),
+            })
+        };
+        Ok(CentreState {
+            version: self.version,
+            now: self.now,
+            noise_scale: self.noise_scale,
+            belief: form(&self.belief)?,
+            members: self.members.clone(),
+            outage: self.outage,
+            monitor: self.monitor,
+            history: self.history.iter().map(checkpoint).collect::<Result<_, E>>()?,
+            dropped: self.dropped,
+            astray: self.astray,
+            alternative: self.alternative.clone(),
+        })
+    }
+}
+
 impl<B: Serialize> CentreState<B> {
     /// The compact binary form: a byte with the version, then CBOR (RFC 8949), in which a double takes at most 9 bytes.
     ///
     /// # Errors
     /// If the belief cannot be serialised.
     pub fn to_bytes(&self) -> Result<Vec<u8>, Error> {
-        let mut bytes = vec![VERSION as u8];
-        match ciborium::into_writer(self, &mut bytes) {
-            Ok(()) => Ok(bytes),
+        match self
+            .map(|belief| Value::serialized(belief))
+            .map(|state| state.plain_bytes())
+        {
+            Ok(bytes) => bytes,
             Err(error) => refuse("belief", error, "a belief that serialises"),
         }
     }
@@ -167,16 +196,38 @@ impl<B: DeserializeOwned> CentreState<B> {
     /// # Errors
     /// If the bytes are of another version, or do not encode a state with this type of belief.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
-        let expected = format!("the bytes of a centre's state of version {VERSION}");
+        let plain = CentreState::of_plain_bytes(bytes)?;
+        match plain.map(|belief| belief.deserialized()) {
+            Ok(state) => Ok(state),
+            Err(error) => refuse("bytes", error, expected()),
+        }
+    }
+}
+
+fn expected() -> String {
+    format!("the bytes of a centre's state of version {VERSION}")
+}
+
+/// A state whose beliefs are plain: all that depends on their type is how they become so.
+impl CentreState<Value> {
+    fn plain_bytes(&self) -> Result<Vec<u8>, Error> {
+        let mut bytes = vec![VERSION as u8];
+        match ciborium::into_writer(self, &mut bytes) {
+            Ok(()) => Ok(bytes),
+            Err(error) => refuse("belief", error, "a belief that serialises"),
+        }
+    }
+
+    fn of_plain_bytes(bytes: &[u8]) -> Result<Self, Error> {
         let mut rest = match bytes.split_first() {
             Some((version, rest)) if u32::from(*version) == VERSION => rest,
-            Some((version, _)) => return refuse("version", version, expected),
-            None => return refuse("bytes", "empty", expected),
+            Some((version, _)) => return refuse("version", version, expected()),
+            None => return refuse("bytes", "empty", expected()),
         };
         match ciborium::from_reader(&mut rest) {
             Ok(state) if rest.is_empty() => Ok(state),
-            Ok(_) => refuse("bytes", format!("{} bytes too many", rest.len()), expected),
-            Err(error) => refuse("bytes", error, expected),
+            Ok(_) => refuse("bytes", format!("{} bytes too many", rest.len()), expected()),
+            Err(error) => refuse("bytes", error, expected()),
         }
     }
 }
