@@ -8,6 +8,8 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Hypotheses of less than this share are no second place.
 const SECOND: f64 = 0.01;
+/// Hypotheses of less than this share do not move the end of a band.
+const FAINT: f64 = 1e-4;
 /// A second place differs by more than this many deviations.
 const APART: f64 = 3.0;
 /// Squares of one and of two standard normal variables that are exceeded once in a thousand cases: each row asks.
@@ -19,7 +21,7 @@ const BAND: f64 = 1.959_963_984_540_054;
 
 /// Steps to the end of a band at most, and by how much the probability beside it may be off.
 const STEPS: usize = 60;
-const CLOSE: f64 = 1e-7;
+const CLOSE: f64 = 1e-6;
 
 /// The estimate after one range. Lengths are in the unit of the anchors' coordinates.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,7 +102,8 @@ pub(super) fn of(known: &Known, hypotheses: &[Hypothesis], lost: bool) -> Option
             covariance[(i, j)] = parts.iter().map(one).sum();
         }
         let law = |one: &Part| (one.share, one.mean[i], one.covariance[i][i].sqrt());
-        bands[i] = band(&parts.iter().map(law).collect::<Vec<_>>());
+        let laws: Vec<(f64, f64, f64)> = parts.iter().filter(|one| one.share > FAINT).map(law).collect();
+        bands[i] = band(&laws);
     }
     let others = parts
         .iter()
