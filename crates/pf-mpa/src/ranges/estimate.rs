@@ -145,6 +145,11 @@ fn is_doubtful(known: &Known, parts: &[Part]) -> bool {
         parts.iter().map(one).sum::<f64>() / (of_i * of_j)
     };
     let off = |(i, of): (usize, f64)| mean(i) / of;
+    // One of the two alone, where the ranges tell of the other nothing.
+    let is_far = |one: (usize, f64)| {
+        let left = 1.0 - covariance(one, one);
+        left > TOLD && off(one).powi(2) > IMPROBABLE[0] * left
+    };
     match asked.as_slice() {
         [one] => off(*one).powi(2) > IMPROBABLE[0] * (1.0 - covariance(*one, *one)),
         [a, b] => {
@@ -152,8 +157,11 @@ fn is_doubtful(known: &Known, parts: &[Part]) -> bool {
             let determinant = left[0] * left[2] - left[1] * left[1];
             let (x, y) = (off(*a), off(*b));
             let square = x * x * left[2] - 2.0 * x * y * left[1] + y * y * left[0];
+            if left[0] <= TOLD || left[2] <= TOLD {
+                return is_far(*a) || is_far(*b);
+            }
             // Ranges that say nothing leave nothing to contradict.
-            left[0] > TOLD && left[2] > TOLD && determinant > TOLD * TOLD && square > IMPROBABLE[1] * determinant
+            determinant > TOLD * TOLD && square > IMPROBABLE[1] * determinant
         }
         _ => false,
     }
