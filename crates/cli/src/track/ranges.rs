@@ -1,6 +1,6 @@
 //! Tracking of a position by distances to anchors.
 
-use super::anchors::read_anchors;
+use super::anchors::{Anchor, read_anchors};
 use super::height::height_found;
 use super::instant::Instant;
 use super::odometry::Odometry;
@@ -18,6 +18,9 @@ use crate::report::Report;
 use fewbits_pf_mpa::{Height, RangeEstimate, RangeSettings, RangeTracker, Travel};
 use serde::Serialize;
 
+/// Most ranges longer than the anchors are apart by this factor, or shorter, have another unit.
+const LONG: f64 = 8.0;
+const SHORT: f64 = 0.05;
 /// A track that is lost once in so many rows is lost often.
 const OFTEN: u64 = 20;
 
@@ -196,6 +199,8 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
             .collect(),
     };
     let mut places = Thinned::new();
+    let apart = farthest(&anchors);
+    let (mut long, mut small) = (0, 0);
     while let Some(instant) = instants.next()? {
         let (mut found, mut ranges, mut events) = (None, 0, "");
         if let Some(by) = odometry.moved(&instant, &instants.names) {
@@ -226,6 +231,8 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
             // The last estimate of an instant has used all of its ranges.
             found = estimate.or(found);
             summary.anchors[anchor].ranges += 1;
+            long += usize::from(range > LONG * apart);
+            small += usize::from(range < SHORT * apart);
             ranges += 1;
         }
         summary.rows += 1;
@@ -281,9 +288,29 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
                 .to_owned(),
         );
     }
+    // A target cannot be near all anchors.
+    if !options.unknown_clock && (2 * long > summary.ranges || 20 * small > 19 * summary.ranges) && summary.ranges > 0 {
+        let (than, apart) = (if 2 * long > summary.ranges { "longer" } else { "shorter" }, short(apart));
+        summary.hints.push(format!(
+            "most ranges are many times {than} than the anchors are apart, {apart}: bring both to one unit, and take a constant delay off the ranges"
+        ));
+    }
+    if instants.copies > 0 {
+        summary
+            .hints
+            .push(format!("{} copies of reports were dropped", instants.copies));
+    }
     let lines = lines(&summary, &tracker, options.silence);
     summarise(&summary, &lines, options.json)?;
     Ok(Ending::Good)
+}
+
+/// The distance of the two anchors that are farthest from each other.
+fn farthest(anchors: &[Anchor]) -> f64 {
+    let pairs = anchors
+        .iter()
+        .flat_map(|(_, one)| anchors.iter().map(move |(_, other)| (one - other).norm()));
+    pairs.fold(0.0, f64::max)
 }
 
 fn lines(summary: &Summary, tracker: &RangeTracker, silence: f64) -> Vec<String> {
@@ -292,7 +319,9 @@ fn lines(summary: &Summary, tracker: &RangeTracker, silence: f64) -> Vec<String>
         format!("{} rows without a place, track lost {} times", summary.searching, summary.losses),
     ];
     if summary.searching == summary.rows {
-        lines.push(format!("a place needs ranges of {} anchors within {silence} s", tracker.needed()));
+        lines.push(format!("a place needs ranges of {} anchors within {silence} s: a larger --silence, or, if times are no seconds, --time-format with their unit",
+            tracker.needed()
+        ));
     }
     if summary.ambiguous > 0 {
         lines.push(format!(

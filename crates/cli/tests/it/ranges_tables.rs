@@ -168,3 +168,17 @@ fn late_rows_are_taken_in() {
     let words = ["ranges", "-", "--anchors", "anchors.csv", "--by", "anchor"];
     assert!(refused(folder.path(), &words, input.as_bytes()).contains("--late"));
 }
+
+/// Ranges in centimetres beside anchors in metres cannot be right, and a track that is lost again and again does not say why.
+#[test]
+fn ranges_of_another_unit_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    anchors(folder.path(), &RECTANGLE, 1.0, false);
+    for (unit, told) in [(100.0, "many times longer"), (0.001, "many times shorter"), (1.0, "")] {
+        let input = table(4, 60, |_, i| unit * distance(&RECTANGLE[i], &[4.1, 2.2, 0.0]));
+        let output = fewbits(folder.path(), &["ranges", "-", "--anchors", "anchors.csv"], input.as_bytes());
+        let said = text(&output.stderr);
+        assert_eq!(said.contains("one unit"), !told.is_empty(), "{said}");
+        assert!(said.contains(told), "{said}");
+    }
+}

@@ -24,6 +24,8 @@ const KEPT: usize = 6;
 const WORSE: f64 = 9.2;
 /// Of pieces and slices those that are not needed: the share of their probabilities.
 const NEGLIGIBLE: f64 = 1e-3;
+/// By how many nats a place with a bias of an anchor's own may be worse than the best place, at the noise that explains the place best.
+const IMPROBABLE: f64 = 9.2;
 /// Slices of a place, and of a place of a piece, in its length's deviation.
 const SLICES: f64 = 4.0;
 const SLICES_OF_A_PIECE: f64 = 2.0;
@@ -169,11 +171,15 @@ pub(super) fn hypotheses(
             } else {
                 (&ranges[..], &good, one.without)
             };
+            let log_prior = penalty(without) + probability.ln() + log_share;
+            let is_probable = |log_evidence: f64| log_evidence + log_prior > best - IMPROBABLE;
+            if is_apart && !search.evidence(one, ranges, *own).is_some_and(is_probable) {
+                continue;
+            }
             let Some((filters, weights, log_evidence)) = search.bank(one, ranges, *own) else {
                 continue;
             };
-            let log_weight = log_evidence + penalty(without) + probability.ln() + log_share;
-            let mut hypothesis = Hypothesis::new(log_weight, filters, weights, good.clone(), variant);
+            let mut hypothesis = Hypothesis::new(log_evidence + log_prior, filters, weights, good.clone(), variant);
             hypothesis.is_cut = is_short(ranges.len() - usize::from(is_apart));
             hypothesis.apart = own.only();
             all.push(hypothesis);

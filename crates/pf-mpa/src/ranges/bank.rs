@@ -17,6 +17,8 @@ const SCORE_KEPT: f64 = 0.9;
 /// Share of a range's evidence that stays in the recent evidence, and by how many nats that of two hypotheses may differ without deciding.
 const RECALLED: f64 = 0.98;
 const UNDECIDED: f64 = 20.0;
+/// A filter of more weight in its hypothesis is kept, however improbable the hypothesis is.
+const LEAST_WEIGHT: f64 = 3e-3;
 /// One explanation of all ranges so far.
 #[derive(Debug)]
 pub(super) struct Hypothesis {
@@ -42,6 +44,8 @@ pub(super) struct Hypothesis {
     /// Per anchor, the decaying sum of scores and that of their variances.
     scores: Vec<(f64, f64)>,
     ranges: u32,
+    /// A filter of less weight is left out.
+    negligible: f64,
     /// The next range, by each filter.
     predicted: Vec<Predicted>,
 }
@@ -62,6 +66,7 @@ impl Clone for Hypothesis {
             behind: self.behind,
             scores: self.scores.clone(),
             ranges: self.ranges,
+            negligible: self.negligible,
             predicted: self.predicted.clone(),
         }
     }
@@ -77,7 +82,7 @@ impl Clone for Hypothesis {
         self.contradicted = from.contradicted;
         (self.recent, self.behind) = (from.recent, from.behind);
         self.scores.clone_from(&from.scores);
-        self.ranges = from.ranges;
+        (self.ranges, self.negligible) = (from.ranges, from.negligible);
         self.filters.truncate(from.filters.len());
         let kept = self.filters.len();
         for ((own, other), weight) in self.filters.iter_mut().zip(&from.filters).zip(&from.weights) {
@@ -113,21 +118,26 @@ impl Hypothesis {
             behind: 0.0,
             scores: vec![(0.0, 0.0); anchors],
             ranges: 0,
+            negligible: 0.0,
             predicted: vec![Predicted::default(); count],
         }
     }
 
-    /// Moves all filters on, after speed and noise may have changed.
-    pub(super) fn predict(&mut self, known: &Known, step: &Step) {
+    /// Moves all filters on, after speed and noise may have changed. `share`: its probability as a share of the best hypothesis's. The less
+    /// it is, the fewer filters are kept.
+    pub(super) fn predict(&mut self, known: &Known, step: &Step, share: f64) {
+        // An anchor that is apart is improbable for long, and then needs the filters that were right all the time.
+        let share = if self.apart.is_none() { share } else { 1.0 };
+        self.negligible = (known.negligible / share).clamp(known.negligible, LEAST_WEIGHT);
         let (speeds, noises) = (known.speeds.len(), known.noises.len());
         self.ranges += 1;
         if self.ranges.is_multiple_of(MIXED) {
             let changes = |a_range: f64| -(f64::from(MIXED) * (-a_range).ln_1p()).exp_m1();
             for noise in 0..noises {
-                self.mix((0..speeds).map(|speed| speed * noises + noise), changes(SPEED_CHANGES), known.negligible);
+                self.mix((0..speeds).map(|speed| speed * noises + noise), changes(SPEED_CHANGES), self.negligible);
             }
             for speed in 0..speeds {
-                self.mix(speed * noises..(speed + 1) * noises, changes(NOISE_CHANGES), known.negligible);
+                self.mix(speed * noises..(speed + 1) * noises, changes(NOISE_CHANGES), self.negligible);
             }
         }
         self.carry(known, step, &[0.0; 3]);
@@ -302,9 +312,14 @@ impl Hypothesis {
         if total <= 0.0 {
             return Err(Error::Impossible);
         }
+        let largest = self
+            .weights
+            .iter()
+            .fold(0.0_f64, |largest, weight| largest.max(*weight));
+        let least = self.negligible.min(largest / total);
         self.weights.iter_mut().for_each(|weight| {
             *weight /= total;
-            if *weight < known.negligible {
+            if *weight < least {
                 *weight = 0.0;
             }
         });
@@ -350,9 +365,14 @@ impl Hypothesis {
             }
             for (a, i) in coordinates.iter().enumerate() {
                 let row = &part.covariance[i * n..(i + 1) * n];
-                for (b, j) in coordinates.iter().enumerate() {
+                for (b, j) in coordinates.iter().enumerate().take(a + 1) {
                     covariance[a][b] += share * (row[*j] + off[a] * off[b]);
                 }
+            }
+        }
+        for a in 0..N {
+            for b in 0..a {
+                covariance[b][a] = covariance[a][b];
             }
         }
         (mean, covariance)

@@ -8,6 +8,8 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Hypotheses of less than this share are no second place.
 const SECOND: f64 = 0.01;
+/// Hypotheses of less than this share do not move the end of a band.
+const FAINT: f64 = 1e-4;
 /// A second place differs by more than this many deviations.
 const APART: f64 = 3.0;
 /// Squares of one and of two standard normal variables that are exceeded once in a thousand cases: each row asks.
@@ -19,7 +21,7 @@ const BAND: f64 = 1.959_963_984_540_054;
 
 /// Steps to the end of a band at most, and by how much the probability beside it may be off.
 const STEPS: usize = 60;
-const CLOSE: f64 = 1e-7;
+const CLOSE: f64 = 1e-6;
 
 /// The estimate after one range. Lengths are in the unit of the anchors' coordinates.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,7 +102,8 @@ pub(super) fn of(known: &Known, hypotheses: &[Hypothesis], lost: bool) -> Option
             covariance[(i, j)] = parts.iter().map(one).sum();
         }
         let law = |one: &Part| (one.share, one.mean[i], one.covariance[i][i].sqrt());
-        bands[i] = band(&parts.iter().map(law).collect::<Vec<_>>());
+        let laws: Vec<(f64, f64, f64)> = parts.iter().filter(|one| one.share > FAINT).map(law).collect();
+        bands[i] = band(&laws);
     }
     let others = parts
         .iter()
@@ -142,6 +145,11 @@ fn is_doubtful(known: &Known, parts: &[Part]) -> bool {
         parts.iter().map(one).sum::<f64>() / (of_i * of_j)
     };
     let off = |(i, of): (usize, f64)| mean(i) / of;
+    // One of the two alone, where the ranges tell of the other nothing.
+    let is_far = |one: (usize, f64)| {
+        let left = 1.0 - covariance(one, one);
+        left > TOLD && off(one).powi(2) > IMPROBABLE[0] * left
+    };
     match asked.as_slice() {
         [one] => off(*one).powi(2) > IMPROBABLE[0] * (1.0 - covariance(*one, *one)),
         [a, b] => {
@@ -149,8 +157,11 @@ fn is_doubtful(known: &Known, parts: &[Part]) -> bool {
             let determinant = left[0] * left[2] - left[1] * left[1];
             let (x, y) = (off(*a), off(*b));
             let square = x * x * left[2] - 2.0 * x * y * left[1] + y * y * left[0];
+            if left[0] <= TOLD || left[2] <= TOLD {
+                return is_far(*a) || is_far(*b);
+            }
             // Ranges that say nothing leave nothing to contradict.
-            left[0] > TOLD && left[2] > TOLD && determinant > TOLD * TOLD && square > IMPROBABLE[1] * determinant
+            determinant > TOLD * TOLD && square > IMPROBABLE[1] * determinant
         }
         _ => false,
     }

@@ -41,7 +41,7 @@ impl Search<'_> {
 /// Gauss-Newton steps at most.
 const STEPS: usize = 30;
 /// A step that promises to lower the cost by less than this share is not taken.
-const SETTLED: f64 = 1e-7;
+const SETTLED: f64 = 1e-4;
 
 /// `S` coordinates: positions, bias and scale.
 type Vector<const S: usize> = [f64; S];

@@ -8,6 +8,22 @@
 
 use super::root::root;
 
+/// Calls a function with constant numbers of coordinates and positions, so that its loops are unrolled. Rare numbers of coordinates are `0`.
+macro_rules! of_size {
+    ($normal:ident.$function:ident($($argument:expr),*)) => {
+        match ($normal.mean.len(), $normal.axes) {
+            (6, 2) => $normal.$function::<6, 2>($($argument),*),
+            (7, 2) => $normal.$function::<7, 2>($($argument),*),
+            (8, 3) => $normal.$function::<8, 3>($($argument),*),
+            (9, 3) => $normal.$function::<9, 3>($($argument),*),
+            (10, 2) => $normal.$function::<10, 2>($($argument),*),
+            (11, 2) => $normal.$function::<11, 2>($($argument),*),
+            (_, 2) => $normal.$function::<0, 2>($($argument),*),
+            _ => $normal.$function::<0, 3>($($argument),*),
+        }
+    };
+}
+
 /// A normal law of the state. The covariance is stored in full, row by row.
 #[derive(Debug, PartialEq)]
 pub(super) struct Normal {
@@ -82,6 +98,16 @@ impl Clone for Normal {
 }
 
 impl Normal {
+    /// What a filter of weight zero holds.
+    pub(super) fn unknown() -> Self {
+        Self {
+            mean: Vec::new(),
+            covariance: Vec::new(),
+            axes: 0,
+            only: None,
+        }
+    }
+
     pub(super) fn bias(&self) -> usize {
         2 * self.axes
     }
@@ -103,30 +129,35 @@ impl Normal {
         self.covariance[i * self.mean.len() + i]
     }
 
+    /// Whether means and variances are finite, and no variance is negative.
     pub(super) fn is_finite(&self) -> bool {
-        let n = self.mean.len();
+        let variances = self.covariance.iter().step_by(self.mean.len() + 1);
         // `0 x` is zero for finite numbers only, and a sum needs no branch per number.
-        let rest = |values: &[f64]| values.iter().map(|x| 0.0 * x).sum::<f64>();
-        rest(&self.mean) == 0.0
-            && rest(&self.covariance) == 0.0
-            && self.covariance.iter().step_by(n + 1).all(|variance| *variance >= 0.0)
+        let rest: f64 = self.mean.iter().chain(variances.clone()).map(|x| 0.0 * x).sum();
+        rest == 0.0 && variances.fold(0.0_f64, |least, variance| least.min(*variance)) >= 0.0
     }
 
     /// Moves the state by a step whose velocities have this variance.
     pub(super) fn predict(&mut self, step: &Step, speed_variance: f64) {
-        let (n, axes, bias) = (self.mean.len(), self.axes, self.bias());
+        of_size!(self.predict_of(step, speed_variance));
+    }
+
+    fn predict_of<const N: usize, const AXES: usize>(&mut self, step: &Step, speed_variance: f64) {
+        let n = if N > 0 { N } else { self.mean.len() };
+        let (axes, bias) = (AXES, 2 * AXES);
+        let (means, covariance) = (&mut self.mean[..n], &mut self.covariance[..n * n]);
         for p in 0..axes {
-            self.mean[p] += step.reach * self.mean[axes + p];
-            self.mean[axes + p] *= step.kept;
+            means[p] += step.reach * means[axes + p];
+            means[axes + p] *= step.kept;
         }
-        let (positions, rest) = self.covariance.split_at_mut(axes * n);
+        let (positions, rest) = covariance.split_at_mut(axes * n);
         for (position, velocity) in positions.chunks_exact_mut(n).zip(rest.chunks_exact_mut(n)) {
             for (p, v) in position.iter_mut().zip(velocity) {
                 *p += step.reach * *v;
                 *v *= step.kept;
             }
         }
-        for row in self.covariance.chunks_exact_mut(n) {
+        for row in covariance.chunks_exact_mut(n) {
             let (positions, rest) = row.split_at_mut(axes);
             for (p, v) in positions.iter_mut().zip(rest) {
                 *p += step.reach * *v;
@@ -136,12 +167,12 @@ impl Normal {
         let cross = step.cross * speed_variance;
         for p in 0..axes {
             let v = axes + p;
-            self.covariance[p * n + p] += step.position * speed_variance;
-            self.covariance[v * n + v] += step.velocity * speed_variance;
-            self.covariance[p * n + v] += cross;
-            self.covariance[v * n + p] += cross;
+            covariance[p * n + p] += step.position * speed_variance;
+            covariance[v * n + v] += step.velocity * speed_variance;
+            covariance[p * n + v] += cross;
+            covariance[v * n + p] += cross;
         }
-        self.covariance[bias * n + bias] += step.drift;
+        covariance[bias * n + bias] += step.drift;
     }
 
     /// Makes the common bias independent of everything, with this mean and variance.
@@ -157,30 +188,41 @@ impl Normal {
 
     /// Moments of the noise-free range to an anchor. `place`: its coordinates. `above`: what it is higher than the target if heights are known.
     pub(super) fn range(&self, place: &[f64; 3], above: f64, anchor: usize, out: &mut Predicted) {
-        let (n, axes) = (self.mean.len(), self.axes);
-        let (bias, scale) = (self.bias(), self.scale());
+        of_size!(self.range_of(place, above, anchor, out));
+    }
+
+    fn range_of<const N: usize, const AXES: usize>(
+        &self,
+        place: &[f64; 3],
+        above: f64,
+        anchor: usize,
+        out: &mut Predicted,
+    ) {
+        let n = if N > 0 { N } else { self.mean.len() };
+        let (axes, bias, scale) = (AXES, 2 * AXES, 2 * AXES + 1);
+        let (means, covariance) = (&self.mean[..n], &self.covariance[..n * n]);
         // A known height: the third coordinates differ by `above`.
-        let mut at = [self.mean[0], self.mean[1], place[2] - above];
+        let mut at = [means[0], means[1], place[2] - above];
         if axes == 3 {
-            at[2] = self.mean[2];
+            at[2] = means[2];
         }
         let distance = |point: &[f64; 3]| {
             let off = [point[0] - place[0], point[1] - place[1], point[2] - place[2]];
             (off[0] * off[0] + off[1] * off[1] + off[2] * off[2]).sqrt()
         };
         let centre = distance(&at);
-        let spread: f64 = (0..axes).map(|i| self.variance(i)).sum();
+        let spread: f64 = (0..axes).map(|i| covariance[i * n + i]).sum();
         // Gradient of the distance by the position, its mean, and the variance that the gradient does not explain.
-        let (mut gradient, mut mean, mut rest) = ([0.0; 3], centre, 0.0);
+        let (mut gradient, mut mean, mut rest) = ([0.0; AXES], centre, 0.0);
         let root = if spread > 1e-5 * centre * centre {
-            self.root(spread)
+            root::<AXES>(axes, 1e-14 * spread, |i, j| covariance[i * n + j])
         } else {
             None
         };
         if let Some(root) = root {
             let reach = (axes as f64).sqrt();
-            let (mut sum, mut squares, mut slopes) = (0.0, 0.0, [0.0; 3]);
-            for (column, slope) in slopes.iter_mut().enumerate().take(axes) {
+            let (mut sum, mut squares, mut slopes) = (0.0, 0.0, [0.0; AXES]);
+            for (column, slope) in slopes.iter_mut().enumerate() {
                 let ends = [1.0, -1.0].map(|sign| {
                     let mut point = at;
                     (0..axes).for_each(|i| point[i] += sign * reach * root[i][column]);
@@ -203,41 +245,32 @@ impl Normal {
         } else if centre > 0.0 {
             (0..axes).for_each(|i| gradient[i] = (at[i] - place[i]) / centre);
         }
-        let factor = 1.0 + self.mean[scale];
-        out.mean = factor * mean + self.mean[bias];
+        let factor = 1.0 + means[scale];
+        out.mean = factor * mean + means[bias];
         let own = self.own(anchor);
-        out.mean += own.map_or(0.0, |own| self.mean[own]);
+        out.mean += own.map_or(0.0, |own| means[own]);
         // The covariance is symmetric: a sum of rows, by what each coordinate does to the range.
-        out.cross.clear();
-        let row = |i: usize| &self.covariance[i * n..(i + 1) * n];
+        out.cross.resize(n, 0.0);
+        let cross = &mut out.cross[..n];
+        let row = |i: usize| &covariance[i * n..(i + 1) * n];
         let (first, second) = (factor * gradient[0], factor * gradient[1]);
-        let pairs = row(0).iter().zip(row(1)).zip(row(bias).iter().zip(row(scale)));
-        out.cross
-            .extend(pairs.map(|((x, y), (bias, scale))| first * x + second * y + (bias + mean * scale)));
+        let (x, y, biases, scales) = (row(0), row(1), row(bias), row(scale));
+        for (i, sum) in cross.iter_mut().enumerate() {
+            *sum = first * x[i] + second * y[i] + (biases[i] + mean * scales[i]);
+        }
         let more = [
-            (axes == 3).then_some((2, factor * gradient[2])),
+            (axes == 3).then(|| (2, factor * gradient[axes - 1])),
             own.map(|own| (own, 1.0)),
         ];
         for (i, slope) in more.into_iter().flatten() {
-            out.cross.iter_mut().zip(row(i)).for_each(|(sum, x)| *sum += slope * x);
+            cross.iter_mut().zip(row(i)).for_each(|(sum, x)| *sum += slope * x);
         }
-        let positions: f64 = (0..axes).map(|i| out.cross[i] * gradient[i]).sum();
-        let linear =
-            factor * positions + mean * out.cross[scale] + out.cross[bias] + own.map_or(0.0, |own| out.cross[own]);
-        out.variance = linear.max(0.0) + factor * factor * rest + self.variance(scale) * (rest + self.along(&gradient));
-    }
-
-    /// Variance of the position along a direction.
-    fn along(&self, direction: &[f64; 3]) -> f64 {
-        let n = self.mean.len();
-        let row = |i: usize| -> f64 { (0..self.axes).map(|j| self.covariance[i * n + j] * direction[j]).sum() };
-        (0..self.axes).map(|i| row(i) * direction[i]).sum::<f64>().max(0.0)
-    }
-
-    /// The lower triangular root of the positions' covariance; `None` if it is singular.
-    fn root(&self, spread: f64) -> Option<[[f64; 3]; 3]> {
-        let n = self.mean.len();
-        root(self.axes, 1e-14 * spread, |i, j| self.covariance[i * n + j])
+        let positions: f64 = (0..axes).map(|i| cross[i] * gradient[i]).sum();
+        let linear = factor * positions + mean * cross[scale] + cross[bias] + own.map_or(0.0, |own| cross[own]);
+        // Variance of the position along the gradient.
+        let along = |i: usize| -> f64 { (0..axes).map(|j| covariance[i * n + j] * gradient[j]).sum() };
+        let explained = (0..axes).map(|i| along(i) * gradient[i]).sum::<f64>().max(0.0);
+        out.variance = linear.max(0.0) + factor * factor * rest + scales[scale] * (rest + explained);
     }
 
     /// Conditions on a range whose noise-free value has this mean and variance afterwards. `holds_scale`: mean and variance of the error of
@@ -245,19 +278,30 @@ impl Normal {
     /// parameter, Schmidt 1966). So a direction in which the ranges say nothing is not taken for known because the range is linearised at
     /// another place each time.
     pub(super) fn condition(&mut self, predicted: &Predicted, mean: f64, variance: f64, holds_scale: bool) {
-        if predicted.variance <= 0.0 {
-            return;
+        if predicted.variance > 0.0 {
+            of_size!(self.condition_of(predicted, mean, variance, holds_scale));
         }
-        let (n, scale) = (self.mean.len(), self.scale());
+    }
+
+    fn condition_of<const N: usize, const AXES: usize>(
+        &mut self,
+        predicted: &Predicted,
+        mean: f64,
+        variance: f64,
+        holds_scale: bool,
+    ) {
+        let n = if N > 0 { N } else { self.mean.len() };
+        let scale = 2 * AXES + 1;
+        let (means, covariance, cross) = (&mut self.mean[..n], &mut self.covariance[..n * n], &predicted.cross[..n]);
         let shift = (mean - predicted.mean) / predicted.variance;
         let shrink = (predicted.variance - variance) / (predicted.variance * predicted.variance);
-        let held = (self.mean[scale], self.variance(scale));
-        for (mean, cross) in self.mean.iter_mut().zip(&predicted.cross) {
+        let held = (means[scale], covariance[scale * n + scale]);
+        for (mean, cross) in means.iter_mut().zip(cross) {
             *mean += cross * shift;
         }
-        for (row, cross) in self.covariance.chunks_exact_mut(n).zip(&predicted.cross) {
-            let gain = cross * shrink;
-            for (x, other) in row.iter_mut().zip(&predicted.cross) {
+        for (row, of_row) in covariance.chunks_exact_mut(n).zip(cross) {
+            let gain = of_row * shrink;
+            for (x, other) in row.iter_mut().zip(cross) {
                 *x -= gain * other;
             }
         }
@@ -265,16 +309,16 @@ impl Normal {
             if shrink < 0.0 {
                 // A variance that grows, as that of a doubtful range does: what is held has no part in it, or its covariances would outgrow its
                 // variance.
-                let back = predicted.cross[scale] * shrink;
-                for (i, cross) in predicted.cross.iter().enumerate() {
-                    self.covariance[scale * n + i] += back * cross;
-                    self.covariance[i * n + scale] = self.covariance[scale * n + i];
+                let back = cross[scale] * shrink;
+                for (i, cross) in cross.iter().enumerate() {
+                    covariance[scale * n + i] += back * cross;
+                    covariance[i * n + scale] = covariance[scale * n + i];
                 }
             }
-            (self.mean[scale], self.covariance[scale * n + scale]) = held;
+            (means[scale], covariance[scale * n + scale]) = held;
         }
         // Rounding must not leave a negative variance of a coordinate that is known.
-        self.covariance
+        covariance
             .iter_mut()
             .step_by(n + 1)
             .for_each(|variance| *variance = variance.max(0.0));

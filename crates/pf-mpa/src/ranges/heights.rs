@@ -3,6 +3,7 @@
 use super::{Height, RangeSettings, RangeTracker, Travel};
 use crate::Error;
 use nalgebra::Vector3;
+use std::collections::BTreeMap;
 
 /// Differences of height that are tried where the anchors' table says no heights, in spreads of the anchors.
 const TRIED: [f64; 6] = [0.0, 0.1, 0.2, 0.3, 0.45, 0.7];
@@ -22,7 +23,7 @@ const FEWEST: usize = 8;
 /// The constant height of the target, from its first ranges: each height that is tried is a tracker, and their evidences decide. `ranges`: time in
 /// seconds, anchor and range. If all anchors have the height 0, it is the difference to them, above or below, and only returned if the ranges say that
 /// there is one. `None` if the ranges do not tell it, if it is stated or the clock unknown, if there are fewer than four anchors or eight ranges of
-/// each, or if a tracker loses the track.
+/// each that differ from the one before, or if a tracker loses the track.
 ///
 /// # Errors
 /// As [`RangeTracker::new`] and [`RangeTracker::push`].
@@ -36,6 +37,15 @@ pub fn height_of(
         return Ok(None);
     }
     let ranges = &ranges[..ranges.len().min(RANGES)];
+    // A range that repeats the one before of its anchor, as rounded ones of a target at rest do, says nothing more of the height.
+    let mut latest: BTreeMap<&str, f64> = BTreeMap::new();
+    let mut told = 0;
+    for (_, anchor, range) in ranges {
+        told += usize::from(latest.insert(anchor, *range) != Some(*range));
+    }
+    if told < FEWEST * anchors.len() {
+        return Ok(None);
+    }
     let evidence = |height: f64| -> Result<f64, Error> {
         let settings = RangeSettings {
             height: Height::Known(height),

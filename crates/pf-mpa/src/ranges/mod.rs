@@ -272,9 +272,10 @@ impl RangeTracker {
         let (known, place) = (&self.known, &self.places[anchor]);
         let step = Step::over(elapsed, known.persistence, known.drift);
         let shares = shares_of(next);
+        let largest = shares.iter().copied().fold(0.0, f64::max);
         let (mut mean, mut square) = (0.0, 0.0);
         for (one, share) in next.iter_mut().zip(&shares) {
-            one.predict(known, &step);
+            one.predict(known, &step, *share / largest);
             if let Some(clock) = known.clock.filter(|_| is_new) {
                 one.forget_bias(known, clock, place, anchor, range);
             }

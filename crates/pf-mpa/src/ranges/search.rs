@@ -14,6 +14,8 @@ const MAXIMA: usize = 4;
 const NEGLIGIBLE_MAXIMUM: f64 = 14.0;
 /// Of the noises, every so many are tried for a place.
 const NOISES_TRIED: usize = 2;
+/// Of so many noises or speeds all are in a place's bank from the first range on.
+const FEW: usize = 5;
 /// Filters whose ranges' variances differ by less than this factor have the same place.
 const ALIKE: f64 = 1.2;
 /// Slices to either side of the middle at most, and by how many nats one may be worse than the best.
@@ -213,13 +215,28 @@ impl Search<'_> {
         found
     }
 
+    /// The evidence of a place and biases of single anchors, at the place's noise and a speed in the middle.
+    pub(super) fn evidence(&self, one: &Found, ranges: &[Collected], own: Own) -> Option<f64> {
+        let speed = self.known.speeds[self.known.speeds.len() / 2];
+        let rows = Rows::new(ranges, one.noise, speed, one.slice);
+        let (_, log_evidence) = fit(self, &one.normal.mean, &rows, speed, own)?;
+        Some(log_evidence + one.log_share())
+    }
+
     /// The filters of a place with their weights, and its evidence over all of them.
     pub(super) fn bank(&self, one: &Found, ranges: &[Collected], own: Own) -> Option<(Vec<Normal>, Vec<f64>, f64)> {
         let mut filters: Vec<Option<(Normal, f64)>> = Vec::new();
         // Of each fit the variances of the ranges, and its number.
         let mut fitted: Vec<(Vec<f64>, usize)> = Vec::new();
-        for speed in &self.known.speeds {
-            for noise in &self.known.noises {
+        // Of many, every second is tried, counted from the largest. Those between take their places if evidence is for them.
+        let is_tried = |index: usize, count: usize| count <= FEW || (count - 1 - index).is_multiple_of(2);
+        let (speeds, noises) = (&self.known.speeds, &self.known.noises);
+        for (at, speed) in speeds.iter().enumerate() {
+            for (of_speed, noise) in noises.iter().enumerate() {
+                if !is_tried(at, speeds.len()) || !is_tried(of_speed, noises.len()) {
+                    filters.push(None);
+                    continue;
+                }
                 let variances: Vec<f64> = ranges
                     .iter()
                     .map(|range| noise * noise + (speed * range.age).powi(2) + own.of(range.anchor).powi(2))
@@ -251,7 +268,9 @@ impl Search<'_> {
             .flatten()
             .map(|(_, log)| *log)
             .fold(f64::NEG_INFINITY, f64::max);
-        let (stand_in, _) = filters.iter().flatten().find(|(_, log)| *log == highest).cloned()?;
+        if highest == f64::NEG_INFINITY {
+            return None;
+        }
         let weights: Vec<f64> = filters
             .iter()
             .map(|one| one.as_ref().map_or(0.0, |(_, log)| (log - highest).exp()))
@@ -260,7 +279,7 @@ impl Search<'_> {
         let log_evidence = highest + (total / weights.len() as f64).ln() + one.log_share();
         let filters = filters
             .into_iter()
-            .map(|one| one.map_or_else(|| stand_in.clone(), |(normal, _)| normal));
+            .map(|one| one.map_or_else(Normal::unknown, |(normal, _)| normal));
         Some((filters.collect(), weights.iter().map(|weight| weight / total).collect(), log_evidence))
     }
 }

@@ -3,7 +3,7 @@
 use fewbits_core::Dynamics;
 use fewbits_models::ContinuousLinear;
 use fewbits_monte_carlo::Stream;
-use fewbits_pf_mpa::{RangeSettings, RangeTracker, Travel};
+use fewbits_pf_mpa::{RangeSettings, RangeTracker, Travel, height_of};
 use nalgebra::{Vector3, Vector4};
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -139,23 +139,27 @@ fn walk(room: &Room, seed: u64, travel: Travel, settings: RangeSettings) -> Outc
     outcome
 }
 
-/// The rooms of these seeds.
-fn measure(seeds: Range<u64>, travel: Travel) -> (f64, usize) {
-    let settings = RangeSettings {
-        anchor_bias: Some(0.0),
-        ..RangeSettings::default()
-    };
+/// The rooms of these seeds. `long`: in each of at least four anchors, one is .5 to 3 m too long for good.
+fn measure(seeds: Range<u64>, travel: Travel, settings: RangeSettings, long: bool) -> (f64, usize) {
     let outcomes: Vec<(Room, Outcome)> = std::thread::scope(|scope| {
         let half = |odd: u64| {
             let seeds = seeds.clone();
             scope.spawn(move || {
                 let one = |seed: u64| {
-                    let room = Room::random(seed);
+                    let mut room = Room::random(seed);
+                    if long {
+                        if room.anchors.len() < 4 {
+                            return None;
+                        }
+                        let mut rng = Stream::new(seed).named("long").rng();
+                        let anchor = rng.random_range(0..room.anchors.len());
+                        room.long = Some((anchor, 0.5 + 2.5 * rng.random::<f64>()));
+                    }
                     let outcome = walk(&room, seed, travel, settings);
-                    (room, outcome)
+                    Some((room, outcome))
                 };
                 let own = seeds.filter(|seed| seed % 2 == odd);
-                own.map(one).collect::<Vec<_>>()
+                own.filter_map(one).collect::<Vec<_>>()
             })
         };
         [half(0), half(1)]
@@ -187,9 +191,17 @@ fn measure(seeds: Range<u64>, travel: Travel) -> (f64, usize) {
         );
     }
     let share = held as f64 / rows as f64;
+    // Rows of a room are not independent: the deviation is that of the rooms' shares.
+    let squares: f64 = outcomes
+        .iter()
+        .map(|(_, one)| (one.held as f64 - share * one.rows as f64).powi(2))
+        .sum();
+    let deviation = squares.sqrt() / rows as f64;
+    let named = outcomes.iter().filter(|(_, one)| one.own_bias.is_some()).count();
     let sum = |of: fn(&Outcome) -> f64| outcomes.iter().map(|(_, one)| of(one)).sum::<f64>();
     println!(
-        "{travel:?}: rooms {seeds:?}: held {share:.4}, wrong in {wrong}, losses {}, searching {}: {:.0} us a range; tracking {:.1} us a range",
+        "{travel:?}: {} rooms of {seeds:?}: held {share:.4} +- {deviation:.4}, wrong in {wrong}, named {named}, losses {}, searching {}: {:.0} us a range; tracking {:.1} us a range",
+        outcomes.len(),
         sum(|one| one.losses as f64),
         sum(|one| one.searching as f64),
         1e6 * sum(|one| one.seconds[0]) / sum(|one| one.searching as f64 + 1.0),
@@ -212,12 +224,20 @@ fn measure(seeds: Range<u64>, travel: Travel) -> (f64, usize) {
     (share, wrong)
 }
 
+/// Without biases of single anchors, as the rooms are.
+fn none_alone() -> RangeSettings {
+    RangeSettings {
+        anchor_bias: Some(0.0),
+        ..RangeSettings::default()
+    }
+}
+
 const TRAVELS: [Travel; 3] = [Travel::Full, Travel::Bits(1), Travel::Bits(2)];
 
 #[test]
 fn no_confident_place_is_wrong() {
     for travel in TRAVELS {
-        let (share, wrong) = measure(0..12, travel);
+        let (share, wrong) = measure(0..12, travel, none_alone(), false);
         assert!(wrong == 0 && share > 0.9, "{travel:?}: {wrong} rooms, bands hold {share}");
     }
 }
@@ -326,15 +346,64 @@ fn an_unknown_clock_loses_no_track() {
     );
 }
 
-/// The measurement in full: 400 rooms from seed `FROM` on.
+const HALL: [[f64; 2]; 5] = [[0.0, 0.0], [14.0, 1.0], [13.0, 10.0], [-1.0, 9.0], [6.0, 12.0]];
+
+fn hall() -> Vec<(String, Vector3<f64>)> {
+    let place = |(i, [x, y]): (usize, &[f64; 2])| (format!("h{i}"), Vector3::new(*x, *y, 0.0));
+    HALL.iter().enumerate().map(place).collect()
+}
+
+/// Defect: ranges with a delay of 150 m put the target 100 m away with an error of scale of half, and no row was doubtful, since such ranges do not tell
+/// the bias.
+#[test]
+fn a_scale_far_from_its_prior_is_doubtful() {
+    let anchors = hall();
+    let mut tracker = RangeTracker::new(anchors.clone(), Travel::Full, RangeSettings::default()).unwrap();
+    let mut doubtful = 0;
+    for k in 0..300 {
+        let (name, place) = &anchors[k % 5];
+        let truth = Vector3::new(5.0 + 3.0 * (0.02 * k as f64).sin(), 4.0 + 2.0 * (0.03 * k as f64).cos(), 0.0);
+        let range = (truth - place).norm() + 150.0 + 0.1 * (2.4 * k as f64).sin();
+        let found = tracker.push(0.25 * k as f64, name, range).unwrap();
+        doubtful += usize::from(found.is_some_and(|found| found.is_doubtful || found.lost));
+    }
+    assert!(doubtful > 200, "{doubtful} of 300");
+}
+
+/// Defect: ranges of a target at rest, rounded to half a metre, were taken for hundreds of pieces of evidence: the target was 6.5 m higher than the
+/// anchors, and 2 m beside its place.
+#[test]
+fn rounded_ranges_at_rest_tell_no_height() {
+    let (anchors, truth) = (hall(), Vector3::new(4.2, 3.3, 0.0));
+    let rounded = |k: usize| (2.0 * (truth - anchors[k % 5].1).norm()).round() / 2.0;
+    let ranges: Vec<(f64, &str, f64)> = (0..400)
+        .map(|k| (0.25 * k as f64, anchors[k % 5].0.as_str(), rounded(k)))
+        .collect();
+    assert_eq!(height_of(&anchors, RangeSettings::default(), &ranges).unwrap(), None);
+}
+
+fn number(name: &str) -> Option<u64> {
+    std::env::var(name).ok().and_then(|number| number.parse().ok())
+}
+
+/// The measurement in full: `ROOMS` rooms from seed `FROM` on, with the default settings.
 #[test]
 #[ignore = "minutes"]
 fn four_hundred_rooms() {
-    let number = |name: &str| std::env::var(name).ok().and_then(|number| number.parse::<u64>().ok());
     let (from, rooms) = (number("FROM").unwrap_or(0), number("ROOMS").unwrap_or(400));
-    for travel in TRAVELS {
-        let (share, wrong) = measure(from..from + rooms, travel);
+    let found = TRAVELS.map(|travel| (travel, measure(from..from + rooms, travel, RangeSettings::default(), false)));
+    for (travel, (share, wrong)) in found {
         assert!(wrong == 0, "{travel:?}: {wrong} rooms");
         assert!((0.93..=0.97).contains(&share), "{travel:?}: bands hold {share}");
     }
+}
+
+/// The same with one anchor that is too long for good.
+#[test]
+#[ignore = "minutes"]
+fn rooms_with_a_long_anchor() {
+    let (from, rooms) = (number("FROM").unwrap_or(0), number("ROOMS").unwrap_or(120));
+    let (share, wrong) = measure(from..from + rooms, Travel::Full, RangeSettings::default(), true);
+    assert!(wrong == 0, "{wrong} rooms");
+    assert!((0.93..=0.97).contains(&share), "bands hold {share}");
 }
