@@ -204,6 +204,7 @@ fn stored(found: &Fit, names: &[String], bits: &[usize]) -> Found {
             .iter()
             .map(|one| (title(one.quantity, names), one.reason.clone()))
             .collect(),
+        jumps: found.jumps.clone(),
         log_likelihood: found.log_likelihood,
     }
 }
@@ -232,6 +233,13 @@ fn page(found: &Fit, names: &[String], (bits, steps): (&[usize], &[Option<f64>])
                 "{name} is rounded to {step}: its values are taken as cells, its noise is that before rounding\n"
             );
         }
+    }
+    if let Some(first) = found.jumps.first() {
+        let (times, more) = match found.jumps.len() {
+            1 => ("once", ""),
+            count => (&*format!("{count} times"), "first "),
+        };
+        text += &format!("the level jumps {times}, {more}at {} s: jumps are no part of its change\n", column(*first));
     }
     for one in &found.tests {
         let name = &names[one.sensor];
