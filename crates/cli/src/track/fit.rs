@@ -9,7 +9,7 @@ use crate::Ending;
 use crate::bounds::PerColumn;
 use crate::error::Error;
 use crate::fit_options::{FitOptions, Sought};
-use crate::numbers::{above_zero, column};
+use crate::numbers::{above_zero, column, short};
 use crate::output;
 use crate::say::say;
 use fewbits_filters::calibration::{self, Reading};
@@ -79,7 +79,7 @@ pub(crate) fn run(options: &FitOptions) -> Result<Ending, Error> {
     if options.json {
         output::json(&stored)?;
     } else {
-        output::print(&page(&found, &names, (&bits, &steps), readings.len()))?;
+        output::print(&page(&found, &names, (&bits, &steps), &readings))?;
     }
     Ok(Ending::Good)
 }
@@ -209,8 +209,13 @@ fn stored(found: &Fit, names: &[String], bits: &[usize]) -> Found {
     }
 }
 
-fn page(found: &Fit, names: &[String], (bits, steps): (&[usize], &[Option<f64>]), rows: usize) -> String {
-    let mut text = format!("{rows} rows; offsets are relative to {}\n\n", names[found.relative_to]);
+fn page(
+    found: &Fit,
+    names: &[String],
+    (bits, steps): (&[usize], &[Option<f64>]),
+    rows: &[calibration::Instant],
+) -> String {
+    let mut text = format!("{} rows; offsets are relative to {}\n\n", rows.len(), names[found.relative_to]);
     text += &format!("{:<50} {:>13} {:>13}\n", "", "value", "error");
     for one in &found.estimates {
         let (name, value) = match one.quantity {
@@ -234,12 +239,12 @@ fn page(found: &Fit, names: &[String], (bits, steps): (&[usize], &[Option<f64>])
             );
         }
     }
-    if let Some(first) = found.jumps.first() {
-        let (times, more) = match found.jumps.len() {
-            1 => ("once", ""),
-            count => (&*format!("{count} times"), "first "),
-        };
-        text += &format!("the level jumps {times}, {more}at {} s: jumps are no part of its change\n", column(*first));
+    if let (Some(first), Some(begin)) = (found.jumps.first(), rows.first()) {
+        text += &format!(
+            "jumps of the level, which are no part of its change: {}, the first {} s after the first row\n",
+            found.jumps.len(),
+            short(first - begin.seconds)
+        );
     }
     for one in &found.tests {
         let name = &names[one.sensor];

@@ -82,6 +82,24 @@ pub struct Fit {
     pub correlations: Vec<Correlation>,
 }
 
+impl Fit {
+    /// `ln p` of the instants from `begin` on, given those before, averaged over the [`posterior`](Self::posterior): what a forecaster reaches who
+    /// allows for the errors of the parameters. The instants before are those that were fitted.
+    ///
+    /// # Errors
+    /// As [`LevelModel::log_likelihood`].
+    pub fn log_predictive(&self, instants: &[Instant], begin: usize) -> Result<f64, Error> {
+        let before = &instants[..begin.min(instants.len())];
+        let of = |one: &WeightedModel| {
+            let past = one.model.log_likelihood(before)?.0;
+            Ok(one.weight.ln() + one.model.log_likelihood(instants)?.0 - past)
+        };
+        let all = self.posterior.iter().map(of).collect::<Result<Vec<f64>, Error>>()?;
+        let largest = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Ok(largest + all.iter().map(|one| (one - largest).exp()).sum::<f64>().ln())
+    }
+}
+
 /// Finds the parameters of a level and `sensors` sensors.
 ///
 /// # Errors

@@ -2,10 +2,7 @@
 
 use super::errors::Spread;
 use super::model::LevelModel;
-use super::parameters::Quantity;
-use super::problem::Problem;
-use super::{Fit, Instant};
-use crate::Error;
+use super::problem::{Hypothesis, Problem};
 use fewbits_numerics::normal::quantile;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
@@ -25,14 +22,6 @@ pub struct WeightedModel {
     pub weight: f64,
     /// The model.
     pub model: LevelModel,
-}
-
-/// Which parameters are there, with the values that fit best.
-pub(super) struct Hypothesis {
-    pub(super) model: LevelModel,
-    pub(super) free: Vec<Quantity>,
-    /// The likelihood of the readings.
-    pub(super) worth: f64,
 }
 
 impl Problem<'_> {
@@ -104,26 +93,12 @@ impl Problem<'_> {
 
 /// Normal numbers that fill the space evenly: multiples of the roots of primes.
 fn normals(number: usize, count: usize) -> DVector<f64> {
-    let is_prime = |one: &usize| (2..*one).take_while(|by| by * by <= *one).all(|by| one % by != 0);
+    let is_prime = |one: &usize| {
+        (2..*one)
+            .take_while(|by| by * by <= *one)
+            .all(|by| !one.is_multiple_of(by))
+    };
     let roots = (2..).filter(is_prime).map(|prime| (prime as f64).sqrt());
     let one = |root: f64| quantile((0.5 + (number + 1) as f64 * root).fract().clamp(1e-9, 1.0 - 1e-9));
     DVector::from_iterator(count, roots.take(count).map(one))
-}
-
-impl Fit {
-    /// `ln p` of the instants from `begin` on, given those before, averaged over the [`posterior`](Self::posterior): what a forecaster reaches who
-    /// allows for the errors of the parameters. The instants before are those that were fitted.
-    ///
-    /// # Errors
-    /// As [`LevelModel::log_likelihood`].
-    pub fn log_predictive(&self, instants: &[Instant], begin: usize) -> Result<f64, Error> {
-        let before = &instants[..begin.min(instants.len())];
-        let of = |one: &WeightedModel| {
-            let past = one.model.log_likelihood(before)?.0;
-            Ok(one.weight.ln() + one.model.log_likelihood(instants)?.0 - past)
-        };
-        let all = self.posterior.iter().map(of).collect::<Result<Vec<f64>, Error>>()?;
-        let largest = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        Ok(largest + all.iter().map(|one| (one - largest).exp()).sum::<f64>().ln())
-    }
 }

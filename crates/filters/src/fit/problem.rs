@@ -2,7 +2,6 @@
 
 use super::model::{LevelModel, Scale};
 use super::parameters::{Quantity, Refusal};
-use super::posterior::Hypothesis;
 use super::readings::Readings;
 use super::search::{Maximum, maximum};
 use crate::calibration::{Instant, median};
@@ -25,6 +24,14 @@ const LITTLE: f64 = 1e-6;
 const ENOUGH: f64 = 1e-2;
 /// Half of the delays that are tried, in half intervals between readings.
 const DELAYS: i32 = 12;
+
+/// Which parameters are there, with the values that fit best.
+pub(super) struct Hypothesis {
+    pub(super) model: LevelModel,
+    pub(super) free: Vec<Quantity>,
+    /// The likelihood of the readings.
+    pub(super) worth: f64,
+}
 
 /// The search, in units in which every parameter is about as uncertain.
 pub(super) struct Problem<'a> {
