@@ -19,6 +19,9 @@ pub(super) struct Found {
     /// Name, value and standard error of each parameter that was found; name and reason of each that was not.
     pub(super) estimates: Vec<(String, f64, f64)>,
     pub(super) refused: Vec<(String, String)>,
+    /// Seconds after the first row at which the level jumps.
+    #[serde(default)]
+    pub(super) jumps: Vec<f64>,
     pub(super) log_likelihood: f64,
 }
 

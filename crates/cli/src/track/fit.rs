@@ -9,7 +9,7 @@ use crate::Ending;
 use crate::bounds::PerColumn;
 use crate::error::Error;
 use crate::fit_options::{FitOptions, Sought};
-use crate::numbers::{above_zero, column};
+use crate::numbers::{above_zero, column, short};
 use crate::output;
 use crate::say::say;
 use fewbits_filters::calibration::{self, Reading};
@@ -79,7 +79,7 @@ pub(crate) fn run(options: &FitOptions) -> Result<Ending, Error> {
     if options.json {
         output::json(&stored)?;
     } else {
-        output::print(&page(&found, &names, (&bits, &steps), readings.len()))?;
+        output::print(&page(&found, &names, (&bits, &steps), &readings))?;
     }
     Ok(Ending::Good)
 }
@@ -204,12 +204,18 @@ fn stored(found: &Fit, names: &[String], bits: &[usize]) -> Found {
             .iter()
             .map(|one| (title(one.quantity, names), one.reason.clone()))
             .collect(),
+        jumps: found.jumps.clone(),
         log_likelihood: found.log_likelihood,
     }
 }
 
-fn page(found: &Fit, names: &[String], (bits, steps): (&[usize], &[Option<f64>]), rows: usize) -> String {
-    let mut text = format!("{rows} rows; offsets are relative to {}\n\n", names[found.relative_to]);
+fn page(
+    found: &Fit,
+    names: &[String],
+    (bits, steps): (&[usize], &[Option<f64>]),
+    rows: &[calibration::Instant],
+) -> String {
+    let mut text = format!("{} rows; offsets are relative to {}\n\n", rows.len(), names[found.relative_to]);
     text += &format!("{:<50} {:>13} {:>13}\n", "", "value", "error");
     for one in &found.estimates {
         let (name, value) = match one.quantity {
@@ -232,6 +238,13 @@ fn page(found: &Fit, names: &[String], (bits, steps): (&[usize], &[Option<f64>])
                 "{name} is rounded to {step}: its values are taken as cells, its noise is that before rounding\n"
             );
         }
+    }
+    if let (Some(first), Some(begin)) = (found.jumps.first(), rows.first()) {
+        text += &format!(
+            "jumps of the level, which are no part of its change: {}, the first {} s after the first row\n",
+            found.jumps.len(),
+            short(first - begin.seconds)
+        );
     }
     for one in &found.tests {
         let name = &names[one.sensor];

@@ -9,6 +9,7 @@ use crate::arguments::Model;
 use crate::error::Error;
 use crate::report::Report;
 use fewbits_filters::calibration::{self, Number, median, wrapped};
+use fewbits_filters::fit::{LevelModel, SensorModel, SensorTest};
 use fewbits_recipes::rounding;
 
 /// Ratio of the standard deviation of a normal variable to the median of its distance from its mean.
@@ -20,6 +21,8 @@ const NORMAL_MEDIAN: f64 = 0.6745;
 const DO_NOT_VARY: &str = "the first rows do not vary, so it cannot be found from them";
 /// The own noise of a sensor that rounds is at least this many steps.
 const LEAST_OWN: f64 = 0.05;
+/// Innovations repeat if their correlation is beyond so many deviations: once in a thousand tables of a right model.
+const REPEATING: f64 = 3.3;
 /// A model with a slope is suggested if it explains the first rows better by so many nats.
 const SLOPING: f64 = 20.0;
 
@@ -223,6 +226,48 @@ impl Settings {
             self.found = found.noises;
         }
         Ok(())
+    }
+
+    /// Sensors whose innovations in the first rows repeat, or return: each wrongly with one in a thousand tables. Only of a level that wanders, read by
+    /// values.
+    pub(super) fn repeating(&self, first: &[Instant], names: &[String]) -> Vec<String> {
+        let readings = self.readings(first, names);
+        let is_value = |(_, reading): &(usize, calibration::Reading)| reading.value().is_some();
+        let are_values = readings.iter().all(|instant| instant.values.iter().all(is_value));
+        if self.world.model != Model::Walk || self.world.period.is_some() || !are_values {
+            return Vec::new();
+        }
+        // A constant offset, which is told elsewhere, would last too.
+        let biases = calibration::offsets(&readings, names.len(), None);
+        let sensors = names.iter().zip(biases).enumerate();
+        let model = LevelModel {
+            change: self.world.change / self.world.within.sqrt(),
+            time_constant: None,
+            mean: self.world.prior.0,
+            sensors: sensors
+                .map(|(sensor, (name, bias))| SensorModel {
+                    bias,
+                    ..SensorModel::exact(self.seat(sensor, name).noise)
+                })
+                .collect(),
+        };
+        let tests = model.tests(&readings).unwrap_or_default();
+        let line = |test: &SensorTest| {
+            let name = &names[test.sensor];
+            match test.repetition {
+                z if z > REPEATING => Some(format!(
+                    "{name}: its differences from the forecasts last for several rows ({z:.1} deviations), as a level that moves faster than supposed or a \
+                     noise that lasts makes them: bands may be too narrow; `fewbits fit --reference NAME --find walk` tells which"
+                )),
+                z if z < -REPEATING => Some(format!(
+                    "{name}: its differences from the forecasts turn back ({:.1} deviations), as a noise that sensors share makes them, which is taken \
+                     for the level: bands may be too narrow; --change says how much the level moves, and `fewbits fit --reference NAME` finds the shared noise",
+                    -z
+                )),
+                _ => None,
+            }
+        };
+        tests.iter().filter_map(line).collect()
     }
 
     /// Finds which sensors round so coarsely that a value is a cell.

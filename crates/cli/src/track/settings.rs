@@ -303,6 +303,9 @@ impl Settings {
         }
         let found = hints(options, &first, &instants.names, apart, settings.has_slope);
         settings.hints.extend(found);
+        if options.noise.is_empty() && options.change.is_none() && !options.reports {
+            settings.hints.extend(settings.repeating(&first, &instants.names));
+        }
         Ok(settings)
     }
 

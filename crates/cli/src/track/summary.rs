@@ -4,6 +4,8 @@ use serde::Serialize;
 
 /// Largest number of events that are printed.
 const PRINTED_EVENTS: usize = 12;
+/// Share of rejected reports from which the supposed noise is doubted; of right ones one in a million is rejected.
+const OFTEN: f64 = 0.05;
 
 /// What was found over the whole table.
 #[derive(Serialize)]
@@ -98,12 +100,18 @@ pub(super) fn lines(summary: &Summary) -> Vec<String> {
         lines.push(format!("{} copies of reports were dropped", summary.copies));
     }
     for sensor in summary.sensors.iter().filter(|sensor| sensor.rejected > 0) {
+        let reports = sensor.reports + if summary.is_silence_said { sensor.gaps } else { 0 };
+        let is_noisy = sensor.used && sensor.rejected as f64 > OFTEN * reports as f64;
         lines.push(format!(
-            "{}: {} of {} reports{} were too unlikely and not used",
+            "{}: {} of {reports} reports{} were too unlikely and not used{}",
             sensor.name,
             sensor.rejected,
-            sensor.reports + if summary.is_silence_said { sensor.gaps } else { 0 },
-            if summary.is_silence_said { " and silences" } else { "" }
+            if summary.is_silence_said { " and silences" } else { "" },
+            if is_noisy {
+                ": its noise is larger than supposed, or was so for a while, and bands are too narrow; --noise states a larger one"
+            } else {
+                ""
+            }
         ));
     }
     for sensor in summary.sensors.iter().filter(|sensor| !sensor.used) {

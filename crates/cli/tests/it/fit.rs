@@ -112,3 +112,77 @@ fn single_readings_and_rounded_ones() {
     let page = text(&good(folder.path(), &["fit", "-"], rounded.as_bytes()));
     assert!(page.contains("a is rounded to 1") && !page.contains("b is rounded"), "{page}");
 }
+
+/// Defect: a level that jumps had a change of eight times the size.
+#[test]
+fn jumps_are_told() {
+    let numbers = &mut Numbers(4);
+    let mut table = "time,a,b\n".to_owned();
+    for row in 0..300 {
+        let level = if (100..220).contains(&row) { 24.0 } else { 20.0 };
+        let mut value = |noise: f64| level + noise * numbers.normal();
+        table += &format!("{},{:.4},{:.4}\n", 1000 + 60 * row, value(0.2), value(0.4));
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let page = text(&good(folder.path(), &["fit", "-", "-o", "found.json"], table.as_bytes()));
+    assert!(page.contains("jumps of the level, which are no part of its change: 2, the first 6000 s"), "{page}");
+    let found: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("found.json")).unwrap()).unwrap();
+    assert!(found["change"].as_f64().unwrap() < 0.01, "{found}");
+    let jumps: Vec<f64> = found["jumps"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(|at| at.as_f64())
+        .collect();
+    assert!((jumps[0] - 6000.0).abs() < 1e-6 && (jumps[1] - 13200.0).abs() < 1e-6, "{jumps:?}");
+}
+
+/// Defect: nothing said that a noise that sensors share, one that lasts, and one that grows made the bands too narrow.
+#[test]
+fn track_tells_of_noise_that_is_not_as_supposed() {
+    let folder = tempfile::tempdir().unwrap();
+    let numbers = &mut Numbers(5);
+    let mut told = |kind: &str| {
+        let (mut level, mut lasting, mut table) = (20.0, [0.0; 3], "a,b,c\n".to_owned());
+        for row in 0..500 {
+            level += 0.05 * numbers.normal();
+            let shared = 0.5 * numbers.normal();
+            lasting = lasting.map(|last| 0.9 * last + 0.2 * numbers.normal());
+            let cells = lasting.map(|lasting| {
+                let plain = numbers.normal();
+                let off = match kind {
+                    "shared" => shared + 0.1 * plain,
+                    "lasting" => lasting,
+                    "grows" if row >= 250 => 1.5 * plain,
+                    _ => 0.3 * plain,
+                };
+                format!("{:.5}", level + off)
+            });
+            table += &if kind == "grows" {
+                cells[0].clone() + "\n"
+            } else {
+                cells.join(",") + "\n"
+            };
+        }
+        let table = if kind == "grows" {
+            table.replace("a,b,c", "a")
+        } else {
+            table
+        };
+        let output = crate::fewbits(folder.path(), &["track", "-"], table.as_bytes());
+        text(&output.stderr)
+    };
+    for (kind, line) in [
+        ("shared", "turn back"),
+        ("lasting", "last for several rows"),
+        ("grows", "its noise is larger than supposed"),
+    ] {
+        let told = told(kind);
+        assert!(told.contains(line), "{kind}: {told}");
+    }
+    for _ in 0..4 {
+        let told = told("plain");
+        assert!(!told.contains("forecasts") && !told.contains("larger than supposed"), "{told}");
+    }
+}

@@ -3,16 +3,19 @@
 //! ```text
 //! p(all values | process noise, noise of each sensor) by the Kalman filter of the level, which every sensor measures
 //! each value is wild with probability 1/500, and then anywhere between the smallest and the largest value: it hardly moves the filter
+//! the level jumps with probability 1/1000 at an instant: both beliefs are carried until the readings decide
 //! maximum: first the process noise and one noise of all sensors, then each number by itself, again and again
 //! ```
 //! The density of a value is proper, wild values included. Numbers that are too small are therefore punished by every value that they make
 //! wild. Offsets of sensors are another question: [`offsets`].
 
+mod jumps;
 mod offsets;
 mod on_grid;
 mod reading;
 mod search;
 
+pub(crate) use jumps::{Beliefs, Said};
 pub use offsets::{median, offsets, shift_deviation};
 pub use reading::Reading;
 pub use search::Number;
@@ -25,9 +28,6 @@ use search::Search;
 
 /// Assumed share of wild values.
 const WILD: f64 = 0.002;
-/// Instants in a row without a value that agrees with the prediction after which the level is taken to have jumped; also so many wild values of one
-/// sensor in a row, if the others are likelier where it says that the level is.
-const JUMP: u32 = 4;
 /// Steps of the search, in `ln`.
 const STEPS: [f64; 6] = [2.0, 1.0, 0.5, 0.25, 0.1, 0.03];
 /// Rounds over the single numbers.
@@ -171,8 +171,8 @@ where
 
     fn log_likelihood(&self, instants: &[Instant], range: f64, change: f64, noises: &[f64]) -> Option<f64> {
         let world = (self.world)(change).ok()?;
-        let (mut belief, mut total, mut astray) = (*self.prior, 0.0, 0);
-        let mut alone = vec![(0, 0.0); noises.len()];
+        let mut beliefs = Beliefs::new(*self.prior);
+        let mut total = 0.0;
         let mut now = instants.first()?.seconds;
         // Most steps are as long as the one before.
         let mut step: Option<(f64, Box<dyn GaussianDynamics<D> + '_>)> = None;
@@ -184,62 +184,48 @@ where
                     step = Some((seconds, world.over(seconds).ok()?));
                 }
                 if let Some((_, step)) = &step {
-                    belief = assumed_density::predict(&**step, &belief);
+                    let predict = |belief: &mut Gaussian<D>| {
+                        *belief = assumed_density::predict(&**step, belief);
+                        Ok(())
+                    };
+                    beliefs.predict::<()>(predict).ok()?;
                 }
             }
-            let (mut agreeing, mut farthest, mut has_jumped) = (0.0, 0.0_f64, false);
-            let predicted = belief.mean()[0];
-            for (sensor, reading) in &instant.values {
-                let (mean, covariance) = (*belief.mean(), *belief.covariance());
-                let said = reading.said(mean[0], covariance[(0, 0)], noises[*sensor], self.period)?;
-                let deviation = said.variance.sqrt();
-                let (right, wild) = ((1.0 - WILD) * said.density, reading.wild(WILD, range));
-                total += (right + wild).ln();
-                // The moments of the mixture of "it is wild" and "it is not".
-                let weight = right / (right + wild);
-                agreeing += weight;
-                let (in_row, votes) = &mut alone[*sensor];
-                if weight > 0.5 {
-                    (*in_row, *votes) = (0, 0.0);
-                } else if let Some(level) = reading.middle() {
-                    *in_row += 1;
-                    *votes += self.votes(*sensor, level, predicted, noises, &instant.values);
-                    has_jumped |= *in_row >= JUMP && *votes > 0.0;
-                }
-                farthest = farthest.max((said.score * deviation).abs());
-                let gain = covariance.column(0) / deviation;
-                let off = said.score * said.score;
-                let spread = weight * ((1.0 - said.left) - (1.0 - weight) * off);
-                let next: SMatrix<f64, D, D> = covariance - gain * gain.transpose() * spread;
-                belief = Gaussian::from_trusted_parts(mean + gain * (weight * said.score), next);
-            }
-            astray = if instant.values.is_empty() || agreeing > 0.5 {
-                0
-            } else {
-                astray + 1
-            };
-            if astray >= JUMP || has_jumped {
+            let update = |belief: &mut Gaussian<D>| self.updated(belief, instant, range, noises).ok_or(());
+            let widen = |belief: &mut Gaussian<D>, distance: f64| {
                 let mut covariance = *belief.covariance();
-                covariance[(0, 0)] += farthest * farthest;
-                belief = Gaussian::from_trusted_parts(*belief.mean(), covariance);
-                astray = 0;
-                alone.fill((0, 0.0));
-            }
+                covariance[(0, 0)] += distance * distance;
+                *belief = Gaussian::from_trusted_parts(*belief.mean(), covariance);
+                Ok(())
+            };
+            total += beliefs.update(now, update, widen).ok()?.0;
         }
         (!total.is_nan()).then_some(total)
     }
 
-    /// What the other readings of an instant say of one that is wild: how much likelier they are if the level is where it is than where it was
-    /// predicted, in nats. Those of sensors that are much less accurate than the prediction agree with it wherever the level is.
-    fn votes(&self, own: usize, level: f64, predicted: f64, noises: &[f64], readings: &[(usize, Reading)]) -> f64 {
-        let log = |sensor: usize, reading: &Reading, level: f64| {
-            let said = reading.said(level, 0.0, noises[sensor], self.period);
-            said.map_or(f64::MIN_POSITIVE, |said| said.density.max(f64::MIN_POSITIVE))
-                .ln()
-        };
-        let others = readings.iter().filter(|(sensor, _)| *sensor != own);
-        others
-            .map(|(sensor, reading)| log(*sensor, reading, level) - log(*sensor, reading, predicted))
-            .sum()
+    /// Takes in the readings of an instant; `None` if numbers run out of range.
+    fn updated(&self, belief: &mut Gaussian<D>, instant: &Instant, range: f64, noises: &[f64]) -> Option<Said> {
+        let (mut log_density, mut farthest, mut doubt) = (0.0, 0.0_f64, 0.0_f64);
+        for (sensor, reading) in &instant.values {
+            let (mean, covariance) = (*belief.mean(), *belief.covariance());
+            let said = reading.said(mean[0], covariance[(0, 0)], noises[*sensor], self.period)?;
+            let deviation = said.variance.sqrt();
+            let (right, wild) = ((1.0 - WILD) * said.density, reading.wild(WILD, range));
+            log_density += (right + wild).ln();
+            // The moments of the mixture of "it is wild" and "it is not".
+            let weight = right / (right + wild);
+            doubt = doubt.max(1.0 - weight);
+            farthest = farthest.max((said.score * deviation).abs());
+            let gain = covariance.column(0) / deviation;
+            let off = said.score * said.score;
+            let spread = weight * ((1.0 - said.left) - (1.0 - weight) * off);
+            let next: SMatrix<f64, D, D> = covariance - gain * gain.transpose() * spread;
+            *belief = Gaussian::from_trusted_parts(mean + gain * (weight * said.score), next);
+        }
+        Some(Said {
+            log_density,
+            farthest,
+            doubt,
+        })
     }
 }

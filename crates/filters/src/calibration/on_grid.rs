@@ -1,6 +1,6 @@
 //! The likelihood of a scalar level that silence cuts again and again: its belief is no Gaussian, and that of the same moments finds other numbers.
 
-use super::{Calibration, Instant, JUMP, Level, Number, Reading, WILD};
+use super::{Beliefs, Calibration, Instant, Level, Number, Reading, Said, WILD};
 use crate::Error;
 use crate::moving_grid::{QUICK, mixed, predicted, start, updated};
 use fewbits_core::{Belief, Evolution, Gaussian, GaussianDynamics, Likelihood};
@@ -16,14 +16,14 @@ const SMEARED: f64 = 0.289;
 const NEGLIGIBLE: f64 = 1e-6;
 
 /// A reading of a level, which is wild with a small probability.
-struct Said<'a> {
+struct Doubted<'a> {
     reading: &'a Reading,
     noise: f64,
     period: Option<f64>,
     wild: f64,
 }
 
-impl Said<'_> {
+impl Doubted<'_> {
     fn log_right(&self, level: f64) -> f64 {
         (1.0 - WILD).ln() + self.reading.log_given(level, self.noise, self.period)
     }
@@ -46,14 +46,14 @@ impl Said<'_> {
     }
 }
 
-impl Likelihood<1> for Said<'_> {
+impl Likelihood<1> for Doubted<'_> {
     fn log_likelihood(&self, level: &Vector1<f64>) -> f64 {
         (self.log_right(level[0]).exp() + self.wild).ln()
     }
 }
 
 /// A reading that is not wild.
-struct Right<'a>(&'a Said<'a>);
+struct Right<'a>(&'a Doubted<'a>);
 
 impl Likelihood<1> for Right<'_> {
     fn log_likelihood(&self, level: &Vector1<f64>) -> f64 {
@@ -84,8 +84,8 @@ where
 
     fn on_grid(&self, instants: &[Instant], range: f64, change: f64, noises: &[f64]) -> Result<Option<f64>, Error> {
         let world = (self.world)(change)?;
-        let mut belief = start(self.prior, &QUICK)?;
-        let (mut total, mut astray) = (0.0, 0);
+        let mut beliefs = Beliefs::new(start(self.prior, &QUICK)?);
+        let mut total = 0.0;
         let mut now = instants.first().map_or(0.0, |instant| instant.seconds);
         let mut step: Option<(f64, Box<dyn GaussianDynamics<1> + '_>)> = None;
         for instant in instants {
@@ -96,51 +96,71 @@ where
                     step = Some((seconds, world.over(seconds)?));
                 }
                 if let Some((_, step)) = &step {
-                    belief = predicted(&belief, &**step, &QUICK)?;
+                    beliefs.predict(|belief| {
+                        *belief = predicted(belief, &**step, &QUICK)?;
+                        Ok::<(), Error>(())
+                    })?;
                 }
             }
             if instant.values.is_empty() {
                 continue;
             }
-            let mut said: Vec<Said<'_>> = instant
-                .values
-                .iter()
-                .map(|(sensor, reading)| Said {
-                    reading,
-                    noise: noises[*sensor],
-                    period: self.period,
-                    wild: reading.wild(WILD, range),
-                })
-                .collect();
-            let expected = Belief::mean(&belief)[0];
-            let mut wide: Vec<&dyn Likelihood<1>> = Vec::new();
-            for one in &mut said {
-                let spacing = belief.grid().spacing();
-                if one.reading.width(one.noise) < NARROW * spacing {
-                    let (next, log_likelihood) = one.narrow(belief)?;
-                    belief = next;
-                    total += log_likelihood;
-                } else {
-                    one.noise = one.noise.hypot(SMEARED * spacing);
-                    wide.push(one);
-                }
-            }
-            if !wide.is_empty() {
-                let (next, log_likelihood) = updated(&belief, &wide, &QUICK)?;
-                belief = next;
-                total += log_likelihood;
-            }
-            let level = Belief::mean(&belief)[0];
-            let agrees = said.iter().any(|one| one.log_right(level) > one.wild.ln());
-            astray = if agrees { 0 } else { astray + 1 };
-            if astray >= JUMP {
-                let values = instant.values.iter().filter_map(|(_, reading)| reading.middle());
-                let farthest = values.map(|value| (value - expected).abs()).fold(0.0, f64::max);
-                let variance = Belief::covariance(&belief)[0] + farthest * farthest;
-                belief = start(&Gaussian::scalar(level, variance)?, &QUICK)?;
-                astray = 0;
-            }
+            let update = |belief: &mut PointMass| self.updated_on_grid(belief, instant, range, noises);
+            let widen = |belief: &mut PointMass, distance: f64| {
+                let (level, variance) = (Belief::mean(belief)[0], Belief::covariance(belief)[0]);
+                *belief = start(&Gaussian::scalar(level, variance + distance * distance)?, &QUICK)?;
+                Ok(())
+            };
+            total += beliefs.update(now, update, widen)?.0;
         }
         Ok((!total.is_nan()).then_some(total))
+    }
+
+    fn updated_on_grid(
+        &self,
+        belief: &mut PointMass,
+        instant: &Instant,
+        range: f64,
+        noises: &[f64],
+    ) -> Result<Said, Error> {
+        let mut readings: Vec<Doubted<'_>> = instant
+            .values
+            .iter()
+            .map(|(sensor, reading)| Doubted {
+                reading,
+                noise: noises[*sensor],
+                period: self.period,
+                wild: reading.wild(WILD, range),
+            })
+            .collect();
+        let expected = Belief::mean(belief)[0];
+        let mut log_density = 0.0;
+        let mut wide: Vec<&dyn Likelihood<1>> = Vec::new();
+        for one in &mut readings {
+            let spacing = belief.grid().spacing();
+            if one.reading.width(one.noise) < NARROW * spacing {
+                let (next, log_likelihood) = one.narrow(belief.clone())?;
+                *belief = next;
+                log_density += log_likelihood;
+            } else {
+                one.noise = one.noise.hypot(SMEARED * spacing);
+                wide.push(one);
+            }
+        }
+        if !wide.is_empty() {
+            let (next, log_likelihood) = updated(belief, &wide, &QUICK)?;
+            *belief = next;
+            log_density += log_likelihood;
+        }
+        let level = Belief::mean(belief)[0];
+        let wild = |one: &Doubted<'_>| 1.0 / (1.0 + (one.log_right(level) - one.wild.ln()).exp());
+        let doubt = readings.iter().map(wild).fold(0.0, f64::max);
+        let values = instant.values.iter().filter_map(|(_, reading)| reading.middle());
+        let farthest = values.map(|value| (value - expected).abs()).fold(0.0, f64::max);
+        Ok(Said {
+            log_density,
+            farthest,
+            doubt,
+        })
     }
 }

@@ -129,7 +129,7 @@ impl Reading {
     }
 
     /// Logarithm of its density or probability, if the measurement without noise is `level`.
-    pub(super) fn log_given(&self, level: f64, noise: f64, period: Option<f64>) -> f64 {
+    pub(crate) fn log_given(&self, level: f64, noise: f64, period: Option<f64>) -> f64 {
         match *self {
             Self::Value { value, deviation } => {
                 let noise = deviation.unwrap_or(noise);

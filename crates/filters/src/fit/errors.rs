@@ -1,4 +1,4 @@
-//! Standard errors at the maximum.
+//! What the readings leave open: standard errors at the maximum.
 
 use super::parameters::{Estimate, Quantity, Refusal};
 use super::problem::Problem;
@@ -11,10 +11,18 @@ const UNDETERMINED: f64 = 30.0;
 /// A step in a delay by which the likelihood falls by more than so many nats is halved.
 const FAR: f64 = 8.0;
 
+/// The covariance of the parameters that the readings determine, in units of the search.
+pub(super) struct Spread {
+    /// Which, among those that are free.
+    pub(super) determined: Vec<usize>,
+    /// A factor: the covariance is this times its transpose.
+    pub(super) factor: DMatrix<f64>,
+}
+
 impl Problem<'_> {
-    /// Standard errors. Parameters that the readings do not determine are refused, one after the other: the others' errors are those with it
-    /// held where it is.
-    pub(super) fn errors(&self, refused: &mut Vec<Refusal>) -> Vec<Estimate> {
+    /// From the second derivatives of the likelihood. Parameters that the readings do not determine are left out, one after the other: the others'
+    /// errors are those with it held where it is.
+    pub(super) fn spread(&self) -> Spread {
         // The likelihood has a kink in a delay wherever two readings change places.
         let origin = DVector::zeros(self.free.len());
         let here = self.log_likelihood(&self.model);
@@ -37,70 +45,63 @@ impl Problem<'_> {
         let steps: Vec<f64> = self.free.iter().enumerate().map(step).collect();
         let found = information(|point| self.log_likelihood(&self.at(point)), &origin, &steps);
         let is_number = |i: &usize| found.row(*i).iter().all(|one| one.is_finite());
-        let mut left: Vec<usize> = (0..self.free.len()).filter(is_number).collect();
-        let mut deviations = vec![f64::INFINITY; self.free.len()];
-        let place = |quantity: Quantity| self.free.iter().position(|one| *one == quantity);
-        while !left.is_empty() {
-            let part = DMatrix::from_fn(left.len(), left.len(), |i, j| found[(left[i], left[j])]);
-            let eigen = part.symmetric_eigen();
-            let most = |i: usize| {
-                let quantity = self.free[left[i]];
-                if quantity.is_positive() {
-                    UNDETERMINED_LOG
-                } else {
-                    UNDETERMINED
-                }
+        let mut determined: Vec<usize> = (0..self.free.len()).filter(is_number).collect();
+        loop {
+            let count = determined.len();
+            let part = DMatrix::from_fn(count, count, |i, j| found[(determined[i], determined[j])]);
+            let mut factor = DMatrix::zeros(count, count);
+            if count > 0 {
+                let eigen = part.symmetric_eigen();
+                let root = eigen.eigenvalues.map(|value| 1.0 / value.max(1e-6).sqrt());
+                factor = eigen.eigenvectors * DMatrix::from_diagonal(&root);
+            }
+            let excess = |i: &usize| {
+                let limit = match self.free[determined[*i]].is_positive() {
+                    true => UNDETERMINED_LOG,
+                    false => UNDETERMINED,
+                };
+                factor.row(*i).norm() / limit
             };
-            let errors: Vec<f64> = (0..left.len())
-                .map(|i| {
-                    let one = |k: usize| eigen.eigenvectors[(i, k)].powi(2) / eigen.eigenvalues[k].max(1e-6);
-                    (0..left.len()).map(one).sum::<f64>().sqrt()
-                })
-                .collect();
             // The one that exceeds its limit by most.
-            let excess = |i: &usize| errors[*i] / most(*i);
-            let worst = (0..left.len()).max_by(|one, other| excess(one).total_cmp(&excess(other)));
+            let worst = (0..count).max_by(|one, other| excess(one).total_cmp(&excess(other)));
             let Some(worst) = worst.filter(|worst| excess(worst) > 1.0) else {
-                left.iter().zip(&errors).for_each(|(i, error)| deviations[*i] = *error);
-                // The offset itself is what is read at a level of zero.
-                for (i, quantity) in left.iter().enumerate() {
-                    let Quantity::Bias(sensor) = self.free[*quantity] else {
-                        continue;
-                    };
-                    let gain = place(Quantity::Gain(sensor)).and_then(|gain| left.iter().position(|one| *one == gain));
-                    let Some(gain) = gain else { continue };
-                    let arm = self.scale.middle * self.unit(Quantity::Gain(sensor)) / self.unit(Quantity::Bias(sensor));
-                    let one = |k: usize| {
-                        let along = eigen.eigenvectors[(i, k)] - arm * eigen.eigenvectors[(gain, k)];
-                        along * along / eigen.eigenvalues[k].max(1e-6)
-                    };
-                    deviations[*quantity] = (0..left.len()).map(one).sum::<f64>().sqrt();
-                }
-                break;
+                return Spread { determined, factor };
             };
-            deviations[left[worst]] = f64::INFINITY;
-            left.remove(worst);
+            determined.remove(worst);
         }
+    }
+
+    /// Standard errors. Parameters that the readings do not determine are refused.
+    pub(super) fn errors(&self, spread: &Spread, refused: &mut Vec<Refusal>) -> Vec<Estimate> {
+        let row = |quantity: Quantity| {
+            let place = spread.determined.iter().position(|i| self.free[*i] == quantity)?;
+            Some(spread.factor.row(place))
+        };
         let mut estimates = Vec::new();
-        for (quantity, deviation) in self.free.iter().zip(deviations) {
+        for quantity in &self.free {
             let value = self.value(*quantity);
-            let unit = if quantity.is_positive() {
-                value
-            } else {
-                self.unit(*quantity)
-            };
-            if deviation.is_finite() {
-                estimates.push(Estimate {
-                    quantity: *quantity,
-                    value,
-                    standard_error: deviation * unit,
-                });
-            } else {
+            let Some(mut along) = row(*quantity).map(|row| row.into_owned()) else {
                 refused.push(Refusal {
                     quantity: *quantity,
                     reason: format!("the readings do not determine it; taken as {value:.4e}"),
                 });
+                continue;
+            };
+            // The offset itself is what is read at a level of zero.
+            if let Quantity::Bias(sensor) = *quantity
+                && let Some(gain) = row(Quantity::Gain(sensor))
+            {
+                along -= gain * (self.scale.middle * self.unit(Quantity::Gain(sensor)) / self.unit(*quantity));
             }
+            let unit = match quantity.is_positive() {
+                true => value,
+                false => self.unit(*quantity),
+            };
+            estimates.push(Estimate {
+                quantity: *quantity,
+                value,
+                standard_error: along.norm() * unit,
+            });
         }
         estimates
     }

@@ -33,6 +33,8 @@ pub(super) trait Filter {
     fn expected(&mut self, sensor: usize, model: &SensorModel) -> (f64, f64);
     /// The mean moves by `shift` times the covariance with what was expected, the covariance loses `spread` times the square of that.
     fn update(&mut self, shift: f64, spread: f64);
+    /// The level has jumped: its variance grows.
+    fn widen(&mut self, variance: f64);
 }
 
 /// The mean of the level after a step. Of a level that wanders it stays, to the last digit.
@@ -45,6 +47,7 @@ fn returned(middle: f64, before: f64, step: &Step) -> f64 {
 }
 
 /// No offset wanders: the belief is that of the level.
+#[derive(Debug, Clone)]
 pub(super) struct Steady {
     mean: f64,
     variance: f64,
@@ -78,9 +81,14 @@ impl Filter for Steady {
         self.mean += self.cross * shift;
         self.variance -= self.cross * self.cross * spread;
     }
+
+    fn widen(&mut self, variance: f64) {
+        self.variance += variance;
+    }
 }
 
 /// The level, which is coordinate 0, and the offsets that wander.
+#[derive(Debug, Clone)]
 pub(super) struct Wandering {
     mean: Vec<f64>,
     covariance: Vec<f64>,
@@ -146,5 +154,9 @@ impl Filter for Wandering {
                 *entry -= one * other * spread;
             }
         }
+    }
+
+    fn widen(&mut self, variance: f64) {
+        self.covariance[0] += variance;
     }
 }

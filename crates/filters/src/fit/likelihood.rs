@@ -4,7 +4,7 @@ use super::filter::{Filter, Steady, Step, Wandering};
 use super::model::{LevelModel, Scale};
 use super::readings::{Readings, Told};
 use crate::Error;
-use crate::calibration::Instant;
+use crate::calibration::{Beliefs, Instant, Said};
 
 /// Assumed share of wild values, which keeps one of them from moving everything.
 const WILD: f64 = 1e-3;
@@ -33,6 +33,16 @@ impl LevelModel {
 
     /// The same without checks; `None` if numbers run out of range.
     pub(super) fn run(&self, readings: &Readings, scale: &Scale, each: impl FnMut(usize, f64)) -> Option<f64> {
+        Some(self.pass(readings, scale, each)?.0)
+    }
+
+    /// Times at which the level jumps: where several readings in a row agree on another level than the one that was forecast.
+    pub(super) fn jumps(&self, readings: &Readings, scale: &Scale) -> Vec<f64> {
+        self.pass(readings, scale, |_, _| {})
+            .map_or(Vec::new(), |found| found.1)
+    }
+
+    fn pass(&self, readings: &Readings, scale: &Scale, each: impl FnMut(usize, f64)) -> Option<(f64, Vec<f64>)> {
         if self.sensors.iter().any(|sensor| sensor.walk > 0.0) {
             self.through(readings, scale, Wandering::new(self, scale), each)
         } else {
@@ -40,27 +50,93 @@ impl LevelModel {
         }
     }
 
-    fn through(
+    fn through<F: Filter + Clone>(
         &self,
         readings: &Readings,
         scale: &Scale,
-        mut filter: impl Filter,
+        filter: F,
         mut each: impl FnMut(usize, f64),
-    ) -> Option<f64> {
-        let mut now: Option<f64> = None;
-        // Most steps are as long as the one before.
+    ) -> Option<(f64, Vec<f64>)> {
+        let mut beliefs = Beliefs::new(filter);
         let mut step = Step::new(self, 0.0);
-        // Logarithms are taken of products of many densities.
-        let (mut total, mut product) = (0.0, 1.0);
-        let mut take = |one: &Told, at: f64| {
-            let seconds = at - *now.get_or_insert(at);
+        let (mut total, mut jumps) = (0.0, Vec::new());
+        let mut now: Option<f64> = None;
+        let mut take = |at: f64, group: &[Told]| {
+            let seconds = at - now.replace(at).unwrap_or(at);
             if seconds > 0.0 {
-                now = Some(at);
+                // Most steps are as long as the one before.
                 if seconds != step.seconds {
                     step = Step::new(self, seconds);
                 }
-                filter.predict(self.mean, &step);
+                let predict = |filter: &mut F| {
+                    filter.predict(self.mean, &step);
+                    Ok(())
+                };
+                beliefs.predict::<()>(predict).ok()?;
             }
+            let mut is_first = true;
+            let update = |filter: &mut F| {
+                let scored = |sensor: usize, score: f64| {
+                    if is_first {
+                        each(sensor, score);
+                    }
+                };
+                let said = self.updated(filter, group, scale, scored);
+                is_first = false;
+                said.ok_or(())
+            };
+            let widen = |filter: &mut F, distance: f64| {
+                filter.widen(distance * distance);
+                Ok(())
+            };
+            let (log_density, jump) = beliefs.update(at, update, widen).ok()?;
+            total += log_density;
+            jumps.extend(jump);
+            Some(())
+        };
+        if self.sensors.iter().all(|sensor| sensor.delay == 0.0) {
+            for group in readings.told.chunk_by(|one, other| one.seconds == other.seconds) {
+                take(group[0].seconds, group)?;
+            }
+        } else {
+            // The next reading of each sensor, by the time of the level that it is of.
+            let mut next = vec![0; self.sensors.len()];
+            let (mut group, mut time) = (Vec::new(), f64::NEG_INFINITY);
+            for _ in 0..readings.told.len() {
+                let mut first: Option<(f64, usize, usize)> = None;
+                for (sensor, own) in readings.by_sensor.iter().enumerate() {
+                    let Some(place) = own.get(next[sensor]) else { continue };
+                    let at = readings.told[*place].seconds - self.sensors[sensor].delay;
+                    if first.is_none_or(|(time, before, _)| at < time || (at == time && *place < before)) {
+                        first = Some((at, *place, sensor));
+                    }
+                }
+                let (at, place, sensor) = first?;
+                next[sensor] += 1;
+                if at > time && !group.is_empty() {
+                    take(time, &group)?;
+                    group.clear();
+                }
+                time = at;
+                group.push(readings.told[place]);
+            }
+            take(time, &group)?;
+        }
+        (!total.is_nan() && !readings.told.is_empty()).then_some((total, jumps))
+    }
+
+    /// Takes in readings of the level at one time.
+    fn updated(
+        &self,
+        filter: &mut impl Filter,
+        group: &[Told],
+        scale: &Scale,
+        mut each: impl FnMut(usize, f64),
+    ) -> Option<Said> {
+        // Logarithms are taken of products of many densities.
+        let (mut total, mut product) = (0.0, 1.0);
+        let (mut farthest, mut doubt) = (0.0_f64, 0.0_f64);
+        for one in group {
             let model = &self.sensors[one.sensor];
             let (expected, variance) = filter.expected(one.sensor, model);
             let expected = expected + model.bias + model.slope * (one.seconds - scale.begin);
@@ -77,32 +153,22 @@ impl LevelModel {
                 each(one.sensor, said.score);
             }
             let weight = right / both;
+            doubt = doubt.max(1.0 - weight);
+            let deviation = said.variance.sqrt();
+            let distance = (said.score * deviation / model.gain).abs();
+            // Not with a gain of zero, which the search may try.
+            farthest = if distance.is_finite() {
+                farthest.max(distance)
+            } else {
+                farthest
+            };
             let spread = weight * ((1.0 - said.left) - (1.0 - weight) * said.score * said.score);
-            filter.update(weight * said.score / said.variance.sqrt(), spread / said.variance);
-            Some(())
-        };
-        if self.sensors.iter().all(|sensor| sensor.delay == 0.0) {
-            for one in &readings.told {
-                take(one, one.seconds)?;
-            }
-        } else {
-            // The next reading of each sensor, by the time of the level that it is of.
-            let mut next = vec![0; self.sensors.len()];
-            for _ in 0..readings.told.len() {
-                let mut first: Option<(f64, usize, usize)> = None;
-                for (sensor, own) in readings.by_sensor.iter().enumerate() {
-                    let Some(place) = own.get(next[sensor]) else { continue };
-                    let at = readings.told[*place].seconds - self.sensors[sensor].delay;
-                    if first.is_none_or(|(time, before, _)| at < time || (at == time && *place < before)) {
-                        first = Some((at, *place, sensor));
-                    }
-                }
-                let (at, place, sensor) = first?;
-                next[sensor] += 1;
-                take(&readings.told[place], at)?;
-            }
+            filter.update(weight * said.score / deviation, spread / said.variance);
         }
-        let total = total + product.ln();
-        (!total.is_nan() && !readings.told.is_empty()).then_some(total)
+        Some(Said {
+            log_density: total + product.ln(),
+            farthest,
+            doubt,
+        })
     }
 }

@@ -3,7 +3,8 @@
 //! ```text
 //! level     random walk, or Ornstein-Uhlenbeck (a time constant)
 //! sensor    gain * level(t - delay) + bias + slope * t + walk(t) + noise; a bit says whether that is above zero: its threshold is -bias
-//! p(all readings | parameters) by the moment filter; a reading is wild with probability 1/1000
+//! p(all readings | parameters) by the moment filter; a reading is wild with probability 1/1000,
+//!           and if several in a row are, the level has jumped
 //! maximum   by quasi-Newton steps; standard errors from the second derivatives there (observed information)
 //! test      standardised innovations must have mean square one and must not repeat
 //! ```
@@ -15,6 +16,7 @@ mod filter;
 mod likelihood;
 mod model;
 mod parameters;
+mod posterior;
 mod problem;
 mod readings;
 mod search;
@@ -22,6 +24,7 @@ mod tests_of_fit;
 
 pub use model::{LevelModel, SensorModel};
 pub use parameters::{Estimate, Quantity, Refusal};
+pub use posterior::WeightedModel;
 pub use tests_of_fit::{Correlation, SensorTest};
 
 use crate::Error;
@@ -59,8 +62,10 @@ pub struct Request {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Fit {
-    /// The model.
+    /// The model that fits best.
     pub model: LevelModel,
+    /// What else the readings leave possible, as a sample: the errors of the parameters, and faults that may be there or not.
+    pub posterior: Vec<WeightedModel>,
     /// The sensor to which biases, gains, slopes and delays are relative: the reference, or one that was chosen.
     pub relative_to: usize,
     /// Every parameter that was found.
@@ -69,10 +74,30 @@ pub struct Fit {
     pub refused: Vec<Refusal>,
     /// `ln p` of all readings.
     pub log_likelihood: f64,
+    /// Seconds at which the level jumped.
+    pub jumps: Vec<f64>,
     /// Tests of the sensors of values.
     pub tests: Vec<SensorTest>,
     /// Correlations between the noises of two sensors, with a reference only.
     pub correlations: Vec<Correlation>,
+}
+
+impl Fit {
+    /// `ln p` of the instants from `begin` on, given those before, averaged over the [`posterior`](Self::posterior): what a forecaster reaches who
+    /// allows for the errors of the parameters. The instants before are those that were fitted.
+    ///
+    /// # Errors
+    /// As [`LevelModel::log_likelihood`].
+    pub fn log_predictive(&self, instants: &[Instant], begin: usize) -> Result<f64, Error> {
+        let before = &instants[..begin.min(instants.len())];
+        let of = |one: &WeightedModel| {
+            let past = one.model.log_likelihood(before)?.0;
+            Ok(one.weight.ln() + one.model.log_likelihood(instants)?.0 - past)
+        };
+        let all = self.posterior.iter().map(of).collect::<Result<Vec<f64>, Error>>()?;
+        let largest = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Ok(largest + all.iter().map(|one| (one - largest).exp()).sum::<f64>().ln())
+    }
 }
 
 /// Finds the parameters of a level and `sensors` sensors.
@@ -165,18 +190,23 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
     if request.slope {
         problem.try_without_slopes(request.walk, &mut refused);
     }
-    let estimates = problem.errors(&mut refused);
+    let spread = problem.spread();
+    let estimates = problem.errors(&spread, &mut refused);
+    let posterior = problem.posterior(&spread);
     let (log_likelihood, residuals) = problem.model.log_likelihood(instants)?;
+    let jumps = problem.model.jumps(&problem.readings, &problem.scale);
     let tests = tests_of_fit::of(&residuals);
     let correlations = request
         .reference
         .map_or(Vec::new(), |reference| tests_of_fit::correlations(instants, &problem.model, reference));
     Ok(Fit {
         model: problem.model,
+        posterior,
         relative_to,
         estimates,
         refused,
         log_likelihood,
+        jumps,
         tests,
         correlations,
     })

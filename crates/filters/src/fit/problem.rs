@@ -25,17 +25,27 @@ const ENOUGH: f64 = 1e-2;
 /// Half of the delays that are tried, in half intervals between readings.
 const DELAYS: i32 = 12;
 
+/// Which parameters are there, with the values that fit best.
+pub(super) struct Hypothesis {
+    pub(super) model: LevelModel,
+    pub(super) free: Vec<Quantity>,
+    /// The likelihood of the readings.
+    pub(super) worth: f64,
+}
+
 /// The search, in units in which every parameter is about as uncertain.
 pub(super) struct Problem<'a> {
-    readings: Readings,
+    pub(super) readings: Readings,
     /// Stretches of a long table, by which the search begins, and whether it is about these now.
-    part: Option<Readings>,
+    pub(super) part: Option<Readings>,
     is_rough: bool,
     pub(super) scale: Scale,
     pub(super) model: LevelModel,
     /// The first guess.
     guess: LevelModel,
     pub(super) free: Vec<Quantity>,
+    /// What explains the readings as well, or nearly.
+    pub(super) left_out: Vec<Hypothesis>,
     /// Seconds of all readings, and between two.
     length: f64,
     interval: f64,
@@ -60,6 +70,7 @@ impl<'a> Problem<'a> {
             guess: model.clone(),
             model,
             free,
+            left_out: Vec::new(),
             length: if length > 0.0 { length } else { 1.0 },
             interval: if interval > 0.0 { interval } else { 1.0 },
             goes_on: &|| true,
@@ -116,7 +127,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The likelihood, less what changes and noises far from the first guess cost.
-    fn worth(&self, model: &LevelModel) -> f64 {
+    pub(super) fn worth(&self, model: &LevelModel) -> f64 {
         let far = |quantity: &Quantity| {
             let pair = match *quantity {
                 Quantity::Change => (model.change, self.guess.change),
@@ -244,12 +255,26 @@ impl<'a> Problem<'a> {
         let found = self.climb_nearly();
         let is_short = self.model.time_constant.is_some_and(|seconds| seconds < self.length);
         if !is_short || found < wandering + WORTH {
-            (self.model, self.free) = (before, free);
+            self.leave_out(before, free, found);
             refused.push(Refusal {
                 quantity: Quantity::TimeConstant,
                 reason: "a level that only wanders explains the readings as well".to_owned(),
             });
-        } else if self.part.is_some() {
+        } else {
+            self.keep(before, free, wandering);
+        }
+    }
+
+    /// Goes back to a model, and keeps the present one for the posterior.
+    fn leave_out(&mut self, model: LevelModel, free: Vec<Quantity>, worth: f64) {
+        let (model, free) = (std::mem::replace(&mut self.model, model), std::mem::replace(&mut self.free, free));
+        self.left_out.push(Hypothesis { model, free, worth });
+    }
+
+    /// Ends the climb of the present model, and keeps another one for the posterior.
+    fn keep(&mut self, model: LevelModel, free: Vec<Quantity>, worth: f64) {
+        self.left_out.push(Hypothesis { model, free, worth });
+        if self.part.is_some() {
             self.climb();
         }
     }
@@ -263,14 +288,15 @@ impl<'a> Problem<'a> {
             let (before, free) = (self.model.clone(), self.free.clone());
             let steady = self.worth(&before);
             self.let_wander(sensor);
-            if self.climb_nearly() < steady + WORTH_OF_WALK {
-                (self.model, self.free) = (before, free);
+            let found = self.climb_nearly();
+            if found < steady + WORTH_OF_WALK {
+                self.leave_out(before, free, found);
                 refused.push(Refusal {
                     quantity: Quantity::Walk(sensor),
                     reason: "an offset that does not wander explains the readings as well".to_owned(),
                 });
-            } else if self.part.is_some() {
-                self.climb();
+            } else {
+                self.keep(before, free, steady);
             }
         }
     }
@@ -304,20 +330,20 @@ impl<'a> Problem<'a> {
             model.slope = 0.0;
             let is_wandering = self.free.contains(&Quantity::Walk(sensor));
             let most = if is_wandering { WORTH_BESIDE_WALK } else { WORTH };
-            let mut is_left = self.climb_nearly() + most >= drifting;
+            let mut found = self.climb_nearly();
+            let mut is_left = found + most >= drifting;
             if !is_left && may_wander && !is_wandering {
                 self.let_wander(sensor);
-                is_left = self.climb_nearly() + WORTH_BESIDE_WALK >= drifting;
+                found = self.climb_nearly();
+                is_left = found + WORTH_BESIDE_WALK >= drifting;
                 if is_left {
                     refused.retain(|one| one.quantity != Quantity::Walk(sensor));
                 }
             }
             if !is_left {
-                (self.model, self.free) = (before, free);
+                self.leave_out(before, free, found);
             } else {
-                if self.part.is_some() {
-                    self.climb();
-                }
+                self.keep(before, free, drifting);
                 refused.push(Refusal {
                     quantity: slope,
                     reason: "an offset that does not drift explains the readings as well".to_owned(),

@@ -1,6 +1,7 @@
 //! Whether a model explains its readings.
 
 use super::model::LevelModel;
+use crate::Error;
 use crate::calibration::Instant;
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +43,16 @@ pub struct Correlation {
     pub value: f64,
     /// Its standard error.
     pub standard_error: f64,
+}
+
+impl LevelModel {
+    /// Whether the model explains the values of each sensor.
+    ///
+    /// # Errors
+    /// As [`log_likelihood`](Self::log_likelihood).
+    pub fn tests(&self, instants: &[Instant]) -> Result<Vec<SensorTest>, Error> {
+        Ok(of(&self.log_likelihood(instants)?.1))
+    }
 }
 
 pub(super) fn of(residuals: &[Vec<f64>]) -> Vec<SensorTest> {

@@ -401,3 +401,25 @@ fn values_far_sharper_than_the_grid_are_not_wild() {
     let found = on_grid(&instants, Number::Unknown { guess, least: 0.0 }, 0.005);
     assert!(found.log_likelihood > highest - 0.5 && (0.025..0.1).contains(&found.change), "{found:?} {highest}");
 }
+
+/// Also on a grid the level may jump where one sensor agrees with the prediction.
+#[test]
+fn jumps_that_one_sensor_sees_are_no_change_on_a_grid() {
+    let mut instants = recorded(2, 0.001, &[0.05, 0.6, 0.6], &[], 120);
+    for (first, by) in [(30, 0.8), (70, 0.9)] {
+        for (_, reading) in instants[first..].iter_mut().flat_map(|instant| &mut instant.values) {
+            *reading = Reading::from(reading.value().unwrap() + by);
+        }
+    }
+    let level = Level {
+        world: |change: f64| ContinuousLinear::random_walk(change * change),
+        prior: &Gaussian::scalar(20.0, 0.25).unwrap(),
+        period: None,
+    };
+    let noises = [0.05, 0.6, 0.6].map(Number::Known);
+    let found = level.calibrate_on_grid(&instants, UNKNOWN, &noises).unwrap();
+    assert!(found.change < 0.02, "{found:?}");
+    // Where the belief is nearly Gaussian both likelihoods are the same.
+    let moments = level.calibrate(&instants, UNKNOWN, &noises).unwrap();
+    assert!((found.log_likelihood - moments.log_likelihood).abs() < 1.0, "{found:?} {moments:?}");
+}

@@ -1,231 +1,82 @@
 //! Calibration against the parameters that made the readings.
 
+use crate::fit_worlds::{ROWS, exact, kinds, record, true_value, walk};
 use fewbits_filters::calibration::{Instant, Reading};
-use fewbits_filters::fit::{Fit, LevelModel, Quantity, Request, SensorModel, fit, fit_watched};
+use fewbits_filters::fit::{LevelModel, Quantity, Request, SensorModel, fit, fit_watched};
 use fewbits_monte_carlo::Stream;
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-const ROWS: usize = 200;
-
-/// Instants of a world, twice as many as are fitted: sensors of `bits` say whether they are above zero. Sensor 0 reads first.
-fn record(seed: u64, truth: &LevelModel, bits: &[usize], rows: usize) -> Vec<Instant> {
-    let mut rng = Stream::new(seed).named("fit").rng();
-    let mut noise = || rng.sample::<f64, _>(StandardNormal);
-    // The level in steps of a tenth of a second, so that delays are multiples of a step.
-    let steps = 10 * rows + 400;
-    let short = 0.1;
-    let mut level = vec![truth.mean; steps];
-    for k in 1..steps {
-        let before = level[k - 1];
-        level[k] = match truth.time_constant {
-            Some(constant) => {
-                let kept = f64::exp(-short / constant);
-                let settled = 0.5 * truth.change * truth.change * constant;
-                truth.mean + kept * (before - truth.mean) + (settled * (1.0 - kept * kept)).sqrt() * noise()
-            }
-            None => before + truth.change * short.sqrt() * noise(),
-        };
-    }
-    let mut walks = vec![0.0; truth.sensors.len()];
-    (0..rows)
-        .map(|row| {
-            let values = truth.sensors.iter().enumerate().map(|(sensor, own)| {
-                walks[sensor] += own.walk * noise();
-                let late = (own.delay / short).round() as usize;
-                let x = level[200 + 10 * row - late];
-                let value = own.gain * x + own.bias + own.slope * row as f64 + walks[sensor] + own.noise * noise();
-                let reading = match bits.contains(&sensor) {
-                    false => Reading::from(value),
-                    true if value > 0.0 => Reading::Within {
-                        lower: 0.0,
-                        upper: f64::INFINITY,
-                    },
-                    true => Reading::Within {
-                        lower: f64::NEG_INFINITY,
-                        upper: 0.0,
-                    },
-                };
-                (sensor, reading)
-            });
-            Instant {
-                seconds: row as f64,
-                values: values.collect(),
-            }
-        })
-        .collect()
-}
-
-fn walk(change: f64, sensors: Vec<SensorModel>) -> LevelModel {
-    LevelModel {
-        change,
-        time_constant: None,
-        mean: 20.0,
-        sensors,
-    }
-}
-
-fn exact(noise: f64) -> SensorModel {
-    SensorModel::exact(noise)
-}
-
-/// The five kinds of worlds: name, truth, sensors of bits, what is looked for.
-fn kinds() -> Vec<(&'static str, LevelModel, Vec<usize>, Request)> {
-    let biased = |noise: f64, bias: f64| SensorModel { bias, ..exact(noise) };
-    let reference = Request {
-        reference: Some(0),
-        ..Request::default()
-    };
-    vec![
-        (
-            "noises and biases",
-            walk(0.3, vec![exact(0.5), biased(1.5, 2.0), biased(0.8, -1.0)]),
-            vec![],
-            Request::default(),
-        ),
-        (
-            "gain against a reference",
-            walk(
-                1.0,
-                vec![
-                    exact(0.2),
-                    SensorModel {
-                        gain: 1.2,
-                        ..biased(0.6, -3.0)
-                    },
-                ],
-            ),
-            vec![],
-            Request {
-                gain: true,
-                ..reference.clone()
-            },
-        ),
-        (
-            "drifts",
-            walk(
-                0.3,
-                vec![
-                    exact(0.3),
-                    SensorModel {
-                        slope: 0.02,
-                        ..exact(0.5)
-                    },
-                    SensorModel {
-                        walk: 0.15,
-                        ..exact(0.4)
-                    },
-                ],
-            ),
-            vec![],
-            Request {
-                slope: true,
-                walk: true,
-                ..reference.clone()
-            },
-        ),
-        (
-            "a delay",
-            walk(
-                1.0,
-                vec![
-                    exact(0.3),
-                    SensorModel {
-                        delay: 1.5,
-                        ..exact(0.5)
-                    },
-                ],
-            ),
-            vec![],
-            Request {
-                delay: true,
-                ..reference.clone()
-            },
-        ),
-        (
-            "a level that returns, and a threshold",
-            LevelModel {
-                time_constant: Some(8.0),
-                ..walk(1.0, vec![exact(0.4), biased(0.7, -21.0)])
-            },
-            vec![1],
-            Request {
-                time_constant: true,
-                ..Request::default()
-            },
-        ),
-    ]
-}
-
-fn true_value(truth: &LevelModel, quantity: Quantity) -> f64 {
-    match quantity {
-        Quantity::Change => truth.change,
-        Quantity::TimeConstant => truth.time_constant.unwrap(),
-        Quantity::Mean => truth.mean,
-        Quantity::Noise(sensor) => truth.sensors[sensor].noise,
-        Quantity::Bias(sensor) => truth.sensors[sensor].bias,
-        Quantity::Gain(sensor) => truth.sensors[sensor].gain,
-        Quantity::Slope(sensor) => truth.sensors[sensor].slope,
-        Quantity::Walk(sensor) => truth.sensors[sensor].walk,
-        Quantity::Delay(sensor) => truth.sensors[sensor].delay,
-        other => unreachable!("{other:?}"),
-    }
-}
-
-/// Worlds of one kind: parameters within two standard errors, and parameters. Prints in how many worlds held-out readings are less likely than
-/// under the truth by more than one in a hundred.
-fn measure(name: &str, truth: &LevelModel, bits: &[usize], request: &Request, worlds: u64) -> (usize, usize) {
-    let (mut poor, mut within, mut all, mut failed, mut worst) = (0, 0, 0, 0, 0.0_f64);
-    let mut refused = 0;
-    for seed in 0..worlds {
-        let record = record(seed, truth, bits, 2 * ROWS);
-        let found: Fit = fit(&record[..ROWS], truth.sensors.len(), request).unwrap();
-        // Both know the readings before.
-        let held_out = |model: &LevelModel| {
-            model.log_likelihood(&record).unwrap().0 - model.log_likelihood(&record[..ROWS]).unwrap().0
-        };
-        let (own, best) = (held_out(&found.model), held_out(truth));
-        if best - own > 50.0 {
-            println!("  {seed}: {:.1} nats, {:?}, refused {:?}", best - own, found.model, found.refused);
-        }
-        worst = worst.max(best - own);
-        poor += u64::from(best - own > 0.01 * best.abs());
-        for estimate in &found.estimates {
-            let off = (estimate.value - true_value(truth, estimate.quantity)) / estimate.standard_error;
-            within += usize::from(off.abs() < 2.0);
-            all += 1;
-            if worlds < 4 {
-                println!("  {estimate:?} off {off:.1}");
-            }
-        }
-        refused += found.refused.len();
-        failed += found.tests.iter().filter(|test| !test.is_passed()).count();
-    }
-    println!(
-        "{name}: {poor} of {worlds} poor, at most {worst:.1} nats; {within} of {all} within two standard errors; {failed} tests failed, {refused} refused"
-    );
-    (within, all)
-}
-
 #[test]
 fn parameters_are_found_within_their_errors() {
     for (name, truth, bits, request) in kinds() {
-        let (within, all) = measure(name, &truth, &bits, &request, 12);
+        let (mut within, mut all) = (0.0, 0.0_f64);
+        for seed in 0..12 {
+            let found = fit(&record(seed, &truth, &bits, ROWS), truth.sensors.len(), &request).unwrap();
+            for one in &found.estimates {
+                let off = (one.value - true_value(&truth, one.quantity)) / one.standard_error;
+                within += f64::from(off.abs() < 2.0);
+                all += 1.0;
+            }
+        }
         // 95 in a hundred, less four standard errors of so many.
-        let least = 0.95 - 4.0 * (0.95 * 0.05 / all as f64).sqrt();
-        assert!(within as f64 >= least * all as f64, "{name}: {within} of {all}");
+        let least = 0.95 - 4.0 * (0.95 * 0.05 / all).sqrt();
+        assert!(within >= least * all, "{name}: {within} of {all}");
     }
 }
 
-/// The measurement of `docs/fit.md`, a hundred worlds of each kind.
+/// Defect: a fit had no more than the model that fits best, and its gain and offset lost 26 to 34 nats where the level left the range of the rows.
 #[test]
-#[ignore = "two minutes"]
-fn parameters_are_found_in_a_hundred_worlds() {
-    for (name, truth, bits, request) in kinds() {
-        let (within, all) = measure(name, &truth, &bits, &request, 100);
-        let least = 0.95 - 4.0 * (0.95 * 0.05 / all as f64).sqrt();
-        assert!(within as f64 >= least * all as f64, "{name}: {within} of {all}");
+fn a_forecast_allows_for_the_errors_of_the_parameters() {
+    let (_, truth, _, request) = kinds().swap_remove(1);
+    for seed in [1032, 1073, 1095] {
+        let rows = record(seed, &truth, &[], 2 * ROWS);
+        let found = fit(&rows[..ROWS], 2, &request).unwrap();
+        let of = |model: &LevelModel| {
+            model.log_likelihood(&rows).unwrap().0 - model.log_likelihood(&rows[..ROWS]).unwrap().0
+        };
+        let best = of(&truth);
+        let (point, averaged) = (best - of(&found.model), best - found.log_predictive(&rows, ROWS).unwrap());
+        assert!(point > 20.0 && averaged < 6.0, "{seed}: {point} {averaged}");
+        // Mean and deviation of the sample are those that are stated.
+        let sum: f64 = found.posterior.iter().map(|one| one.weight).sum();
+        assert!((sum - 1.0).abs() < 1e-9, "{seed}: {sum}");
+        for one in found
+            .estimates
+            .iter()
+            .filter(|one| matches!(one.quantity, Quantity::Gain(_) | Quantity::Change))
+        {
+            let mean = |of: &dyn Fn(f64) -> f64| {
+                let values = found.posterior.iter();
+                values
+                    .map(|other| other.weight * of(true_value(&other.model, one.quantity)))
+                    .sum::<f64>()
+            };
+            let middle = mean(&|value| value);
+            let deviation = mean(&|value| (value - middle).powi(2)).sqrt();
+            assert!((middle - one.value).abs() < 0.6 * one.standard_error, "{seed}: {one:?} {middle}");
+            assert!((deviation / one.standard_error).ln().abs() < 0.3, "{seed}: {one:?} {deviation}");
+        }
     }
+}
+
+/// A walk that is left out because the readings hardly show it, and one that is kept, both remain possible.
+#[test]
+fn a_walk_that_may_be_there_keeps_its_share() {
+    let truth = walk(0.3, vec![exact(0.3), exact(0.5)]);
+    let request = Request {
+        reference: Some(0),
+        walk: true,
+        ..Request::default()
+    };
+    let mut shares = Vec::new();
+    for seed in 0..10 {
+        let found = fit(&record(seed, &truth, &[], ROWS), 2, &request).unwrap();
+        let wanders = found.posterior.iter().filter(|one| one.model.sensors[1].walk > 0.0);
+        shares.push(wanders.map(|one| one.weight).sum::<f64>());
+        assert_eq!(found.model.sensors[1].walk > 0.0, shares[seed as usize] > 0.2, "{seed}: {shares:?}");
+    }
+    assert!(shares.iter().all(|share| (1e-3..0.9).contains(share)), "{shares:?}");
 }
 
 /// Defects: the climb began at one change and one delay, and ended at a kink 181 nats below the truth; a noise that the readings hardly tell from
@@ -530,4 +381,23 @@ fn bad_readings_are_refused() {
     let mut wrong = rows;
     wrong.swap(3, 4);
     assert!(fit(&wrong, 1, &Request::default()).is_err());
+}
+
+/// A level that jumps is not fitted by a larger change.
+#[test]
+fn jumps_are_neither_change_nor_noise() {
+    for seed in 0..3 {
+        let truth = walk(0.02, vec![exact(0.3), exact(0.5)]);
+        let mut rows = record(seed, &truth, &[], 400);
+        for (first, by) in [(80, 3.0), (150, -2.5), (220, 4.0), (330, 3.0)] {
+            for (_, reading) in rows[first..].iter_mut().flat_map(|row| &mut row.values) {
+                *reading = Reading::from(reading.value().unwrap() + by);
+            }
+        }
+        let found = fit(&rows, 2, &Request::default()).unwrap();
+        assert_eq!(found.jumps, [80.0, 150.0, 220.0, 330.0], "{seed}");
+        let noises = [0.3, 0.5].iter().zip(&found.model.sensors);
+        assert!(noises.clone().all(|(truth, own)| (own.noise / truth).ln().abs() < 0.2), "{seed}: {:?}", found.model);
+        assert!(found.model.change < 0.06, "{seed}: {:?}", found.model);
+    }
 }

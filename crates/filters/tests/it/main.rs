@@ -9,6 +9,7 @@ mod centre;
 mod contract;
 mod failure;
 mod fit;
+mod fit_worlds;
 mod hooks;
 mod imm;
 mod lattice;
