@@ -26,6 +26,7 @@ mod anchors;
 mod applied;
 mod centre;
 mod columns;
+mod divisor;
 mod first;
 mod fit;
 mod found;

@@ -1,6 +1,7 @@
 //! Tracking of a position by distances to anchors.
 
 use super::anchors::{Anchor, read_anchors};
+use super::divisor::common_divisor;
 use super::height::height_found;
 use super::instant::Instant;
 use super::odometry::Odometry;
@@ -201,6 +202,7 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
     let mut places = Thinned::new();
     let apart = farthest(&anchors);
     let (mut long, mut small) = (0, 0);
+    let (mut rounding, mut noise) = (0.0, f64::INFINITY);
     while let Some(instant) = instants.next()? {
         let (mut found, mut ranges, mut events) = (None, 0, "");
         if let Some(by) = odometry.moved(&instant, &instants.names) {
@@ -233,12 +235,14 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
             summary.anchors[anchor].ranges += 1;
             long += usize::from(range > LONG * apart);
             small += usize::from(range < SHORT * apart);
+            rounding = common_divisor(rounding, range);
             ranges += 1;
         }
         summary.rows += 1;
         summary.ranges += ranges;
         match &found {
             Some(found) => {
+                noise = found.noise;
                 let deviations = [0, 1].map(|i| found.covariance[(i, i)].sqrt());
                 places.push((found.position.xy(), deviations));
                 if found.places > 1 {
@@ -293,6 +297,13 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
         let (than, apart) = (if 2 * long > summary.ranges { "longer" } else { "shorter" }, short(apart));
         summary.hints.push(format!(
             "most ranges are many times {than} than the anchors are apart, {apart}: bring both to one unit, and take a constant delay off the ranges"
+        ));
+    }
+    let own = rounding / 12.0_f64.sqrt();
+    if own > noise && options.anchor_bias.is_none() {
+        let (step, own) = (short(rounding), short(own));
+        summary.hints.push(format!(
+            "ranges are multiples of {step}: if they are rounded, their errors last while the target rests, and --anchor-bias {own} makes the band hold them"
         ));
     }
     if instants.copies > 0 {

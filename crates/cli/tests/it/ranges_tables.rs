@@ -182,3 +182,29 @@ fn ranges_of_another_unit_are_told() {
         assert!(said.contains(told), "{said}");
     }
 }
+
+/// Rounded ranges of a target at rest have errors that do not average out: the band was .06 wide and .18 beside the place.
+#[test]
+fn rounded_ranges_are_told_with_the_mend() {
+    let folder = tempfile::tempdir().unwrap();
+    let places = [
+        [0.0, 0.0, 0.0],
+        [14.0, 1.0, 0.0],
+        [13.0, 10.0, 0.0],
+        [-1.0, 9.0, 0.0],
+        [6.0, 12.0, 0.0],
+    ];
+    anchors(folder.path(), &places, 1.0, false);
+    let truth = [4.3, 3.6, 0.0];
+    let said = |step: f64, options: &[&str]| {
+        let input = table(5, 80, |_, i| (distance(&places[i], &truth) / step).round() * step);
+        let words = [&["ranges", "-", "--anchors", "anchors.csv"], options].concat();
+        text(&fewbits(folder.path(), &words, input.as_bytes()).stderr).to_owned()
+    };
+    assert!(said(0.5, &[]).contains("--anchor-bias 0.144"), "{}", said(0.5, &[]));
+    assert!(!said(1e-4, &[]).contains("multiples"));
+    let mend = ["--anchor-bias", "0.144"];
+    assert!(!said(0.5, &mend).contains("multiples"));
+    let input = table(5, 80, |_, i| (distance(&places[i], &truth) / 0.5).round() * 0.5);
+    assert!(holds(ranges(folder.path(), &input, &mend).last().unwrap(), &truth));
+}

@@ -323,8 +323,8 @@ fn held_out_readings_of_a_hundred_worlds() {
             }
         }
         // 95 in a hundred, less four standard errors of so many.
-        let least = 0.95 - 4.0 * (0.95 * 0.05 / f64::from(all)).sqrt();
-        assert!(f64::from(within) >= least * f64::from(all), "{name}: {within} of {all}");
+        let least = 0.95 - 4.0 * (0.95 * 0.05 / all as f64).sqrt();
+        assert!(within as f64 >= least * all as f64, "{name}: {within} of {all}");
         println!("{name}: {} parameters, one in a hundred is {limits:.2} nats", parameters.len());
         println!(
             "  {within} of {all} within two standard errors; the truth is likelier in the fitted rows: {faults} worlds"
