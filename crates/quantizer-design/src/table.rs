@@ -96,6 +96,11 @@ impl JointTable {
         self.log_multiplicity.len()
     }
 
+    /// Values of the unknown, the columns of the table.
+    pub fn values(&self) -> &[f64] {
+        self.model().values()
+    }
+
     /// Index of the outcome in which `symbols[n]` was received from sensor `n`.
     ///
     /// # Errors
