@@ -2,6 +2,7 @@
 
 use super::arrived::Arrived;
 use super::gaussian::{Normal, Predicted, Step, merged};
+use super::rest::Rest;
 use super::settings::Known;
 use crate::Error;
 
@@ -44,6 +45,7 @@ pub(super) struct Hypothesis {
     /// Per anchor, the decaying sum of scores and that of their variances.
     scores: Vec<(f64, f64)>,
     ranges: u32,
+    pub(super) rest: Rest,
     /// A filter of less weight is left out.
     negligible: f64,
     /// The next range, by each filter.
@@ -66,6 +68,7 @@ impl Clone for Hypothesis {
             behind: self.behind,
             scores: self.scores.clone(),
             ranges: self.ranges,
+            rest: self.rest,
             negligible: self.negligible,
             predicted: self.predicted.clone(),
         }
@@ -82,7 +85,7 @@ impl Clone for Hypothesis {
         self.contradicted = from.contradicted;
         (self.recent, self.behind) = (from.recent, from.behind);
         self.scores.clone_from(&from.scores);
-        (self.ranges, self.negligible) = (from.ranges, from.negligible);
+        (self.ranges, self.rest, self.negligible) = (from.ranges, from.rest, from.negligible);
         self.filters.truncate(from.filters.len());
         let kept = self.filters.len();
         for ((own, other), weight) in self.filters.iter_mut().zip(&from.filters).zip(&from.weights) {
@@ -118,6 +121,7 @@ impl Hypothesis {
             behind: 0.0,
             scores: vec![(0.0, 0.0); anchors],
             ranges: 0,
+            rest: Rest::default(),
             negligible: 0.0,
             predicted: vec![Predicted::default(); count],
         }

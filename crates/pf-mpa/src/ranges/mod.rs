@@ -24,6 +24,7 @@ mod gaussian;
 mod heights;
 mod moved;
 mod odds;
+mod rest;
 mod root;
 mod rows;
 mod search;
@@ -314,18 +315,22 @@ impl RangeTracker {
         // Evidence of ranges that every hypothesis can explain is evidence of little errors of the model. Only much of it decides.
         let is_undecided = next.iter().all(is_short);
         let mut best = f64::NEG_INFINITY;
-        next.retain_mut(|one| match one.update(known, anchor, &arrived, !one.is_cut && is_short(one)) {
-            Ok(log_evidence) if is_undecided => {
-                best = best.max(one.recall(log_evidence));
-                one.is_finite()
-            }
-            Ok(log_evidence) => {
-                one.weigh(log_evidence);
-                one.is_finite()
-            }
-            Err(error) => {
-                failed = Some(error);
-                false
+        let holds_scale = |one: &mut Hypothesis| one.rests(known) || (!one.is_cut && is_short(one));
+        next.retain_mut(|one| {
+            let holds_scale = holds_scale(one);
+            match one.update(known, anchor, &arrived, holds_scale) {
+                Ok(log_evidence) if is_undecided => {
+                    best = best.max(one.recall(log_evidence));
+                    one.is_finite()
+                }
+                Ok(log_evidence) => {
+                    one.weigh(log_evidence);
+                    one.is_finite()
+                }
+                Err(error) => {
+                    failed = Some(error);
+                    false
+                }
             }
         });
         // Anchors that send ranges, but contradict each other so much that those that are left do not determine the position.

@@ -4,6 +4,7 @@ use super::RangeTracker;
 use super::bank::Hypothesis;
 use super::estimate::RangeEstimate;
 use super::gaussian::Step;
+use super::settings::Known;
 use crate::Error;
 use fewbits_numerics::error::{finite, refuse};
 use nalgebra::Vector3;
@@ -43,5 +44,20 @@ impl RangeTracker {
             latest.moved.iter_mut().zip(&whole).for_each(|(sum, x)| *sum += x);
         }
         Ok(self.estimate(false))
+    }
+}
+
+impl Hypothesis {
+    /// Whether the error of scale is not to be estimated: from one place, ranges to anchors with biases of their own, or from an unknown clock, do
+    /// not tell it from these, and a filter that linearises them again and again would believe that they do.
+    pub(super) fn rests(&mut self, known: &Known) -> bool {
+        let heaviest = (0..self.filters.len()).max_by(|i, j| self.weights[*i].total_cmp(&self.weights[*j]));
+        let Some(heaviest) = heaviest else {
+            return false;
+        };
+        let state = &self.filters[heaviest];
+        let is_slowest = heaviest < known.noises.len();
+        let is_blind = known.clock.is_some() || state.mean.len() > 2 * state.axes + 2;
+        self.rest.observe(state) && is_slowest && is_blind && known.scale > 0.0
     }
 }
