@@ -178,6 +178,13 @@ impl<'a> Tables<'a> {
                 received + missing
             );
         }
+        let uncounted = sum(FrameReader::uncounted);
+        if uncounted > 0 {
+            say!(
+                "warning: {address}: the end of the table did not arrive: how many frames are missing behind the first {} is not known",
+                received + missing - uncounted
+            );
+        }
         if repeated > 0 {
             say!("note: {address}: {repeated} frames came again and were used once");
         }

@@ -67,6 +67,8 @@ pub struct FrameReader {
     repeated: u64,
     /// Largest number of frames that a piece has stated.
     sent: u64,
+    /// Number of different frames with rows since that piece.
+    behind: u64,
 }
 
 impl FrameReader {
@@ -93,6 +95,12 @@ impl FrameReader {
     /// Number of frames that were sent but have not arrived, as of the last piece of the header.
     pub fn missing(&self) -> u64 {
         self.sent.saturating_sub(self.received)
+    }
+
+    /// Number of frames that arrived behind the last piece of the header that stated a larger number of them. What is missing among these is not
+    /// counted; a sender that ends states their number at last.
+    pub fn uncounted(&self) -> u64 {
+        self.behind
     }
 
     /// Number of frames that wait for the header.
@@ -123,7 +131,9 @@ impl FrameReader {
             return match &self.header {
                 Some(header) if header.check != piece.check => Err(Error::OtherTable),
                 Some(_) => {
-                    self.sent = self.sent.max(piece.frames);
+                    if piece.frames >= self.sent {
+                        (self.sent, self.behind) = (piece.frames, 0);
+                    }
                     Ok(Vec::new())
                 }
                 None => self.piece(piece).map_err(damaged),
@@ -141,6 +151,7 @@ impl FrameReader {
     fn first_time(&mut self, frame: &[u8]) -> bool {
         let is_new = self.seen.is_new(frame);
         *if is_new { &mut self.received } else { &mut self.repeated } += 1;
+        self.behind += u64::from(is_new);
         is_new
     }
 
@@ -200,6 +211,7 @@ impl FrameReader {
                 blocks.push(block);
             }
         }
+        self.behind = 0;
         self.header = Some(header);
         Ok(blocks)
     }

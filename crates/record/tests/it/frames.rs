@@ -36,6 +36,10 @@ fn frames_are_no_longer_than_allowed() {
         for frame in pieces.iter().chain(&frames) {
             keep(&reader.handle(frame).unwrap(), &truth, &mut seen);
         }
+        // The header came first: only when it comes again is it known that no frame is missing.
+        assert_eq!(reader.uncounted(), frames.len() as u64);
+        keep(&reader.handle(&pieces[0]).unwrap(), &truth, &mut seen);
+        assert_eq!(reader.uncounted(), 0);
         assert!(seen.iter().all(|count| *count == 1));
         // Full but for the last: no frame could have held a row more than half of its bytes.
         assert_eq!((reader.missing(), reader.received()), (0, frames.len() as u64));
@@ -58,6 +62,7 @@ fn lost_frames_lose_their_rows_only() {
         }
         keep(&reader.handle(frame).unwrap(), &truth, &mut seen);
     }
+    assert_eq!(reader.uncounted(), 0, "the header came last");
     let missing = seen.iter().filter(|count| **count == 0).count();
     assert_eq!((reader.missing(), reader.received()), (lost as u64, (frames.len() - lost) as u64));
     assert!(seen.iter().all(|count| *count <= 1) && missing > 0 && missing < truth.len() * 2 * lost / frames.len());
