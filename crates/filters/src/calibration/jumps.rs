@@ -10,7 +10,7 @@ const UNDECIDED: u32 = 10;
 const DOUBTED: f64 = 0.05;
 
 /// What the readings of an instant say under a belief.
-pub(crate) struct Said {
+pub(crate) struct InstantLikelihood {
     /// Logarithm of their density.
     pub(crate) log_density: f64,
     /// How far the farthest of the readings is from the prediction.
@@ -35,7 +35,7 @@ struct Other<B> {
 
 impl<B> Other<B> {
     /// Takes in readings; the logarithm of share and density.
-    fn update<E>(&mut self, update: &mut impl FnMut(&mut B) -> Result<Said, E>) -> Result<f64, E> {
+    fn update<E>(&mut self, update: &mut impl FnMut(&mut B) -> Result<InstantLikelihood, E>) -> Result<f64, E> {
         self.instants += 1;
         Ok(self.share.ln() + update(&mut self.belief)?.log_density)
     }
@@ -61,7 +61,7 @@ impl<B: Clone> Beliefs<B> {
     pub(crate) fn update<E>(
         &mut self,
         seconds: f64,
-        mut update: impl FnMut(&mut B) -> Result<Said, E>,
+        mut update: impl FnMut(&mut B) -> Result<InstantLikelihood, E>,
         wider: impl FnOnce(&mut B, f64) -> Result<(), E>,
     ) -> Result<(f64, Option<f64>), E> {
         self.before.clone_from(&self.main);

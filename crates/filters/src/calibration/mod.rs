@@ -15,7 +15,7 @@ mod on_grid;
 mod reading;
 mod search;
 
-pub(crate) use jumps::{Beliefs, Said};
+pub(crate) use jumps::{Beliefs, InstantLikelihood};
 pub use offsets::{median, offsets, shift_deviation};
 pub use reading::Reading;
 pub use search::Number;
@@ -204,7 +204,13 @@ where
     }
 
     /// Takes in the readings of an instant; `None` if numbers run out of range.
-    fn updated(&self, belief: &mut Gaussian<D>, instant: &Instant, range: f64, noises: &[f64]) -> Option<Said> {
+    fn updated(
+        &self,
+        belief: &mut Gaussian<D>,
+        instant: &Instant,
+        range: f64,
+        noises: &[f64],
+    ) -> Option<InstantLikelihood> {
         let (mut log_density, mut farthest, mut doubt) = (0.0, 0.0_f64, 0.0_f64);
         for (sensor, reading) in &instant.values {
             let (mean, covariance) = (*belief.mean(), *belief.covariance());
@@ -222,7 +228,7 @@ where
             let next: SMatrix<f64, D, D> = covariance - gain * gain.transpose() * spread;
             *belief = Gaussian::from_trusted_parts(mean + gain * (weight * said.score), next);
         }
-        Some(Said {
+        Some(InstantLikelihood {
             log_density,
             farthest,
             doubt,

@@ -1,6 +1,6 @@
 //! The likelihood of a scalar level that silence cuts again and again: its belief is no Gaussian, and that of the same moments finds other numbers.
 
-use super::{Beliefs, Calibration, Instant, Level, Number, Reading, Said, WILD};
+use super::{Beliefs, Calibration, Instant, InstantLikelihood, Level, Number, Reading, WILD};
 use crate::Error;
 use crate::moving_grid::{QUICK, mixed, predicted, start, updated};
 use fewbits_core::{Belief, Evolution, Gaussian, GaussianDynamics, Likelihood};
@@ -122,7 +122,7 @@ where
         instant: &Instant,
         range: f64,
         noises: &[f64],
-    ) -> Result<Said, Error> {
+    ) -> Result<InstantLikelihood, Error> {
         let mut readings: Vec<Doubted<'_>> = instant
             .values
             .iter()
@@ -157,7 +157,7 @@ where
         let doubt = readings.iter().map(wild).fold(0.0, f64::max);
         let values = instant.values.iter().filter_map(|(_, reading)| reading.middle());
         let farthest = values.map(|value| (value - expected).abs()).fold(0.0, f64::max);
-        Ok(Said {
+        Ok(InstantLikelihood {
             log_density,
             farthest,
             doubt,

@@ -4,7 +4,7 @@ use super::filter::{Filter, Steady, Step, Wandering};
 use super::model::{LevelModel, Scale};
 use super::readings::{Readings, Told};
 use crate::Error;
-use crate::calibration::{Beliefs, Instant, Said};
+use crate::calibration::{Beliefs, Instant, InstantLikelihood};
 
 /// Assumed share of wild values, which keeps one of them from moving everything.
 const WILD: f64 = 1e-3;
@@ -132,7 +132,7 @@ impl LevelModel {
         group: &[Told],
         scale: &Scale,
         mut each: impl FnMut(usize, f64),
-    ) -> Option<Said> {
+    ) -> Option<InstantLikelihood> {
         // Logarithms are taken of products of many densities.
         let (mut total, mut product) = (0.0, 1.0);
         let (mut farthest, mut doubt) = (0.0_f64, 0.0_f64);
@@ -165,7 +165,7 @@ impl LevelModel {
             let spread = weight * ((1.0 - said.left) - (1.0 - weight) * said.score * said.score);
             filter.update(weight * said.score / deviation, spread / said.variance);
         }
-        Some(Said {
+        Some(InstantLikelihood {
             log_density: total + product.ln(),
             farthest,
             doubt,
