@@ -61,7 +61,12 @@ impl Task {
         };
         let noise = noise.map_err(refused("noise and correlation"))?;
         let model = ObservationModel::new(self.prior.clone(), noise);
-        let model = model.map_err(refused("prior and noise do not go together"))?;
+        let is_small = deviations.iter().any(|deviation| *deviation < none);
+        let model = model.map_err(refused(if is_small {
+            "the noise is too small beside the prior: 0 stands for none"
+        } else {
+            "prior and noise do not go together"
+        }))?;
         let failed = "no design";
         let (bits, link) = (self.bits.clone(), Link::PERFECT);
         let mut request = match self.criterion {

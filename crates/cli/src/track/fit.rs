@@ -5,6 +5,7 @@ use super::columns::Kind;
 use super::first::values_of;
 use super::instant::{Instant, Qualifier};
 use super::rows::Instants;
+use super::stuck::Stuck;
 use crate::Ending;
 use crate::bounds::PerColumn;
 use crate::error::Error;
@@ -12,8 +13,10 @@ use crate::fit_options::{FitOptions, Sought};
 use crate::numbers::{above_zero, column, short};
 use crate::output;
 use crate::say::say;
+use clap::ValueEnum;
+use clap::builder::PossibleValue;
 use fewbits_filters::calibration::{self, Reading};
-use fewbits_filters::fit::{Fit, Quantity, Request, fit};
+use fewbits_filters::fit::{Fit, Quantity, Request, SensorTest, fit};
 use fewbits_recipes::rounding;
 use fewbits_table::Side;
 
@@ -25,7 +28,9 @@ pub(crate) fn run(options: &FitOptions) -> Result<Ending, Error> {
     };
     let mut instants = Instants::open(&options.table, &kind)?;
     let mut rows = Vec::new();
+    let mut stuck = Stuck::default();
     while let Some(instant) = instants.next()? {
+        stuck.add(&instant);
         rows.push(instant);
     }
     instants.roles.told.iter().for_each(|line| say!("{line}"));
@@ -80,7 +85,15 @@ pub(crate) fn run(options: &FitOptions) -> Result<Ending, Error> {
         output::json(&stored)?;
     } else {
         output::print(&page(&found, &names, (&bits, &steps), &readings))?;
+        let left = Sought::value_variants().iter().filter(|one| !has(**one));
+        let left: Vec<_> = left.filter_map(Sought::to_possible_value).collect();
+        let is_explained = found.tests.iter().all(SensorTest::is_passed);
+        if !is_explained && !left.is_empty() {
+            let left: Vec<&str> = left.iter().map(PossibleValue::get_name).collect();
+            say!("what is not explained may be one of these: --find {}", left.join(","));
+        }
     }
+    stuck.hints(&names).iter().for_each(|line| say!("{line}"));
     Ok(Ending::Good)
 }
 
@@ -235,7 +248,8 @@ fn page(
     for (name, step) in names.iter().zip(steps) {
         if let Some(step) = step {
             text += &format!(
-                "{name} is rounded to {step}: its values are taken as cells, its noise is that before rounding\n"
+                "{name} is rounded to {}: its values are taken as cells, its noise is that before rounding\n",
+                short(*step)
             );
         }
     }

@@ -1,12 +1,18 @@
-//! Sensors that repeat one value to its last digit, though their values hardly ever did so before.
+//! Sensors that repeat one value to its last digit, though their values hardly ever did so before, and sensors that repeat another one.
 
 use super::instant::Instant;
+use crate::say;
 use fewbits_numerics::Runs;
+use std::collections::BTreeMap;
 
 /// Equal values in a row from which a sensor is told to be stuck, and others before it, at least.
 const LONG: u32 = 30;
 /// Share of values before it that may equal the one before them.
 const SELDOM: f64 = 0.05;
+/// Share of a sensor's new values that another one has in the same row, from which one of them is told to be a copy.
+const ALIKE: f64 = 0.95;
+/// Of more sensors no pairs are compared.
+const MAX_COMPARED: usize = 32;
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Repeats {
@@ -18,42 +24,80 @@ struct Repeats {
 impl Repeats {
     fn add(&mut self, value: f64) {
         self.runs.add(value);
-        let Runs { pairs, equal, .. } = self.runs;
         let run = self.runs.repetitions.saturating_add(1);
-        let is_seldom = pairs >= LONG && f64::from(equal) <= SELDOM * f64::from(pairs);
         let is_longest = self.stuck.is_none_or(|(_, longest)| run > longest);
-        if run >= LONG && is_seldom && is_longest {
+        if run >= LONG && self.is_seldom() && is_longest {
             self.stuck = Some((value, run));
         }
     }
+
+    /// Whether values hardly ever repeat.
+    fn is_seldom(&self) -> bool {
+        let Runs { pairs, equal, .. } = self.runs;
+        pairs >= LONG && f64::from(equal) <= SELDOM * f64::from(pairs)
+    }
 }
 
-/// Looks in all rows for sensors that are stuck.
+/// Of the rows in which one sensor has another value than before, and a second sensor any: those in which both are equal.
+#[derive(Debug, Clone, Copy, Default)]
+struct Pair {
+    rows: u32,
+    equal: u32,
+}
+
+/// Looks in all rows for sensors that are stuck, and for copies.
 #[derive(Debug, Default)]
-pub(super) struct Stuck(Vec<Repeats>);
+pub(super) struct Stuck {
+    repeats: Vec<Repeats>,
+    /// By the sensor that changes, and the other one behind it.
+    pairs: BTreeMap<(usize, usize), Pair>,
+}
 
 impl Stuck {
     pub(super) fn add(&mut self, instant: &Instant) {
-        for (sensor, cell) in &instant.reports {
-            let Some(value) = cell.filter(|cell| cell.is_finite()) else {
-                continue;
-            };
-            if self.0.len() <= *sensor {
-                self.0.resize(sensor + 1, Repeats::default());
+        let cells = instant.reports.iter();
+        let values = cells.filter_map(|(sensor, cell)| Some((*sensor, cell.filter(|cell| cell.is_finite())?)));
+        let values: Vec<(usize, f64)> = values.collect();
+        for (at, (sensor, value)) in values.iter().enumerate() {
+            if self.repeats.len() <= *sensor {
+                self.repeats.resize(sensor + 1, Repeats::default());
             }
-            self.0[*sensor].add(value);
+            let runs = &self.repeats[*sensor].runs;
+            let is_new = runs.last.is_some_and(|last| last != *value);
+            if is_new && values.len() <= MAX_COMPARED {
+                for (other, its) in values[at + 1..].iter().filter(|(other, _)| other != sensor) {
+                    let pair = self.pairs.entry((*sensor, *other)).or_default();
+                    pair.rows += 1;
+                    pair.equal += u32::from(its == value);
+                }
+            }
+            self.repeats[*sensor].add(*value);
         }
     }
 
-    /// A line for each sensor that is stuck.
+    /// A line for each sensor that is stuck, or repeats another one.
     pub(super) fn hints(&self, names: &[String]) -> Vec<String> {
-        let of = |(repeats, name): (&Repeats, &String)| {
+        let stuck = |(repeats, name): (&Repeats, &String)| {
             let (value, run) = repeats.stuck?;
+            let name = say::name(name);
             Some(format!(
-                "{name} is {value} in {run} values in a row, which its values hardly ever repeat otherwise: it may be stuck; --without {name} \
-                 leaves it out"
+                "{name} is {value} in {run} values in a row, which its values hardly ever repeat otherwise: it may be stuck, or that may mean a gap; \
+                 --missing '{name}={value}' takes it for a gap, --without {name} leaves the column out"
             ))
         };
-        self.0.iter().zip(names).filter_map(of).collect()
+        let copy = |((one, other), pair): (&(usize, usize), &Pair)| {
+            let is_alike = pair.rows >= LONG && f64::from(pair.equal) >= ALIKE * f64::from(pair.rows);
+            let is_copy = is_alike && self.repeats[*one].is_seldom();
+            let (one, other) = (say::name(&names[*one]), say::name(&names[*other]));
+            is_copy.then(|| {
+                format!(
+                    "{other} has the value of {one} in {} of {} rows with a new one: if it is a copy, it counts as a second measurement; \
+                     --without {other} leaves it out",
+                    pair.equal, pair.rows
+                )
+            })
+        };
+        let stuck = self.repeats.iter().zip(names).filter_map(stuck);
+        stuck.chain(self.pairs.iter().filter_map(copy)).collect()
     }
 }

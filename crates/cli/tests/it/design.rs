@@ -105,6 +105,8 @@ fn a_sensor_without_noise_is_designed() {
     for (edge, expected) in edges.iter().zip([3.0 - 2.0 * 0.9816, 3.0, 3.0 + 2.0 * 0.9816]) {
         assert!((edge.as_f64().unwrap() - expected).abs() < 2e-3, "{design}");
     }
+    let small = ["design", "--prior", "3±2", "--noise", "1e-7", "--bits", "2"];
+    assert!(refused(folder.path(), &small, b"").contains("0 stands for none"));
     let sample = "y\n".to_owned() + &"0\n0.3\n0.6\n1\n".repeat(50);
     let design = json(&["design", "-", "--noise", "0", "--bits", "2", "--json"], &sample);
     let edges = design["sensors"][0]["breakpoints"].as_array().unwrap();

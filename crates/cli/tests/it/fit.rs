@@ -1,7 +1,7 @@
 //! `fewbits fit`, and `track` with what it found.
 
 use crate::numbers::Numbers;
-use crate::{good, refused, text};
+use crate::{fewbits, good, refused, text};
 
 /// A reference, a sensor with offset and gain, and a switch at 21.
 fn table(numbers: &mut Numbers, rows: usize) -> (String, Vec<f64>) {
@@ -185,4 +185,27 @@ fn track_tells_of_noise_that_is_not_as_supposed() {
         let told = told("plain");
         assert!(!told.contains("forecasts") && !told.contains("larger than supposed"), "{told}");
     }
+}
+
+/// Defect: a number that stands for gaps was fitted as a value without a word, and of a column that repeats another one nothing was said.
+#[test]
+fn numbers_for_gaps_copies_and_what_may_be_looked_for_are_told() {
+    let mut numbers = Numbers(77);
+    let (mut level, mut gaps, mut copies) = (4.0, "time,a,b\n".to_owned(), "time,a,b,c\n".to_owned());
+    for row in 0..200 {
+        level += 0.1 * numbers.normal();
+        let [a, b, c] = [0.3, 0.3, 0.2].map(|noise| level + noise * numbers.normal());
+        gaps += &format!("{row},{a:.3},{:.3}\n", if row < 120 { b } else { -999.0 });
+        copies += &format!("{row},{a:.3},{b:.3},{:.3}\n", if row % 40 == 7 { c } else { a });
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let said = |table: &str, more: &[&str]| {
+        text(&fewbits(folder.path(), &[&["fit", "-"], more].concat(), table.as_bytes()).stderr)
+    };
+    assert!(said(&gaps, &[]).contains("--missing 'b=-999'"), "{}", said(&gaps, &[]));
+    let mended = said(&gaps, &["--missing", "b=-999"]);
+    assert!(!mended.contains("--missing") && !mended.contains("--find"), "{mended}");
+    let copied = said(&copies, &[]);
+    assert!(copied.contains("c has the value of a in") && !copied.contains("b has the value"), "{copied}");
+    assert!(copied.contains("--find gain,slope,walk,delay,time-constant"), "{copied}");
 }
