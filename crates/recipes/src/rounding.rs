@@ -5,6 +5,8 @@ const COARSE: f64 = 0.75;
 /// Values from which a step is found, at least, and changes from one to the next among them.
 const FEWEST: usize = 50;
 const FEWEST_CHANGES: usize = 4;
+/// Decimals at most, behind the zeros of numbers far below one.
+const MAX_DECIMALS: i32 = 9;
 /// Share of the changes that are multiples of the step.
 const MULTIPLES: f64 = 0.9;
 /// Standard deviation of rounding to a step, in steps.
@@ -13,7 +15,11 @@ pub const DEVIATION: f64 = 0.288_675_134_594_812_9;
 /// The step to which values are rounded, if there is one: not finer than their decimals. Values that hardly ever change may all be multiples of
 /// a larger step by chance: theirs is that of their decimals.
 pub fn step(values: &[f64]) -> Option<f64> {
-    let decimals = (0..=9).map(|decimals| 0.1_f64.powi(decimals)).find(|unit| {
+    let largest = values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+    // Of a unit that is far above all values each would be a multiple.
+    let first = (-largest.log10().ceil()).clamp(0.0, 290.0) as i32;
+    let mut units = (first..=first + MAX_DECIMALS).map(|decimals| 1.0 / 10_f64.powi(decimals));
+    let decimals = units.find(|unit| {
         let off = |value: &f64| (value / unit - (value / unit).round()).abs();
         values.iter().all(|value| off(value) < 1e-6)
     });
@@ -84,6 +90,24 @@ mod tests {
         let codes = |k: u32| 3.3 / 4096.0 * f64::from(1000 + k / 30);
         let seen: Vec<f64> = (0..90).map(codes).collect();
         assert!(step(&seen).is_some_and(|step| (step * 4096.0 / 3.3 - 1.0).abs() < 1e-6), "{:?}", step(&seen));
+    }
+
+    /// Defect: all numbers below a millionth were multiples of one, and rounded to that.
+    #[test]
+    fn steps_do_not_depend_on_the_unit() {
+        let rounded: Vec<f64> = (0..200).map(|k| (3000.0 + 40.0 * (f64::from(k) * 0.37).sin()).round()).collect();
+        for digits in [-9, -3, 0, 2, 5, 9, 15, 30] {
+            let scale = 10_f64.powi(-digits);
+            let values: Vec<f64> = rounded.iter().map(|value| value * scale).collect();
+            let found = step(&values).map(|step| (step / scale * 1e6).round());
+            assert_eq!(found, Some(1e6), "{digits}");
+            let noisy: Vec<f64> = values
+                .iter()
+                .enumerate()
+                .map(|(k, value)| value * (1.0 + 1e-3 * (k as f64).cos()))
+                .collect();
+            assert_eq!(step(&noisy), None, "{digits}");
+        }
     }
 
     #[test]

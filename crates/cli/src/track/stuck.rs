@@ -19,16 +19,43 @@ struct Repeats {
     runs: Runs,
     /// The value of the longest run of one that is stuck, and its length.
     stuck: Option<(f64, u32)>,
+    /// The smallest and the largest value, for each: the present one, and the next one to it.
+    ends: Option<[(f64, f64); 2]>,
 }
 
 impl Repeats {
     fn add(&mut self, value: f64) {
         self.runs.add(value);
+        self.widen(value);
         let run = self.runs.repetitions.saturating_add(1);
         let is_longest = self.stuck.is_none_or(|(_, longest)| run > longest);
         if run >= LONG && self.is_seldom() && is_longest {
             self.stuck = Some((value, run));
         }
+    }
+
+    /// Takes a value into the ends of the range.
+    fn widen(&mut self, value: f64) {
+        let [low, high] = self
+            .ends
+            .get_or_insert([(value, f64::INFINITY), (value, f64::NEG_INFINITY)]);
+        if value < low.0 {
+            *low = (value, low.0);
+        } else if value > low.0 {
+            low.1 = low.1.min(value);
+        }
+        if value > high.0 {
+            *high = (value, high.0);
+        } else if value < high.0 {
+            high.1 = high.1.max(value);
+        }
+    }
+
+    /// Whether a value is farther from all others than they are from each other, as a number that stands for gaps is.
+    fn is_apart(&self, value: f64) -> bool {
+        self.ends.is_some_and(|[(lowest, low), (highest, high)]| {
+            (value == lowest && low - lowest > highest - low) || (value == highest && highest - high > high - lowest)
+        })
     }
 
     /// Whether values hardly ever repeat.
@@ -80,9 +107,13 @@ impl Stuck {
         let stuck = |(repeats, name): (&Repeats, &String)| {
             let (value, run) = repeats.stuck?;
             let name = say::name(name);
+            let mend = if repeats.is_apart(value) {
+                format!("that may mean a gap, as --missing '{name}={value}' says")
+            } else {
+                format!("it may be stuck; --without {name} leaves it out")
+            };
             Some(format!(
-                "{name} is {value} in {run} values in a row, which its values hardly ever repeat otherwise: it may be stuck, or that may mean a gap; \
-                 --missing '{name}={value}' takes it for a gap, --without {name} leaves the column out"
+                "{name} is {value} in {run} values in a row, which its values hardly ever repeat otherwise: {mend}"
             ))
         };
         let copy = |((one, other), pair): (&(usize, usize), &Pair)| {
