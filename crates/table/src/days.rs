@@ -9,19 +9,6 @@ use crate::written::{Clock, NO_TIME, Order, Problem, Syntax, number};
 use jiff::fmt::strtime;
 use std::collections::HashSet;
 
-pub(crate) const DAYS: Problem = (
-    "may be a number of days, as spreadsheets have them",
-    "say --time-format excel, or --time-format s if these are seconds",
-);
-pub(crate) const JULIAN: Problem = (
-    "may be a Julian date, a number of days",
-    "say --time-format jd (or mjd), or --time-format s if these are seconds",
-);
-pub(crate) const COMPACT: Problem = (
-    "may be a date whose digits have no marks",
-    "say its format, as --time-format %y%m%d%H%M or %d%m%Y, or --time-format s if these are seconds",
-);
-
 /// Whether the one column is called as dates are.
 pub(crate) fn has_date_name(names: &[&str]) -> bool {
     let is_date = |name: &&str| {
@@ -84,24 +71,6 @@ fn is_of_day_name(names: &[&str]) -> bool {
         "hhmmss.ss",
     ];
     matches!(names, [name] if WORDS.contains(&name.to_lowercase().as_str()))
-}
-
-/// Whether a column is named as one of Julian dates and has numbers of their size.
-pub(crate) fn may_be_julian(names: &[&str], cells: &[&str]) -> bool {
-    let [name] = names else { return false };
-    let name = name.to_lowercase();
-    let of = |words: &[&str]| {
-        name.split(|c: char| !c.is_ascii_alphanumeric())
-            .any(|word| words.contains(&word))
-    };
-    let within = |low: f64, high: f64| {
-        !cells.is_empty()
-            && cells
-                .iter()
-                .all(|cell| cell.parse().is_ok_and(|days: f64| (low..high).contains(&days)))
-    };
-    (of(&["jd", "bjd", "hjd", "julian"]) && within(2_300_000.0, 2_600_000.0))
-        || (of(&["mjd"]) && within(15_000.0, 90_000.0))
 }
 
 /// Whether a column of dates has numbers of the size of days since 1900.
