@@ -12,6 +12,7 @@ use crate::named::{NAMES, OF_DAY, is_exact_name, is_time_name, starts_an_interva
 use crate::parts::{Part, calendar, is_hour_and_minute, monthly, of_day_parts, parts};
 use crate::time::{Scale, Unit};
 use crate::written::{self, Clock, Order, Problem, Syntax};
+use std::borrow::Cow;
 
 /// What the cells of a column say of the time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -208,7 +209,10 @@ pub(crate) fn clock(
     are_hours: Option<bool>,
     dialect: &mut Dialect,
 ) -> Result<Clock, Refused> {
-    let cells: Vec<&str> = sample.iter().map(String::as_str).collect();
+    let marks = dialect.marks();
+    let plain: Vec<Cow<'_, str>> = sample.iter().map(|cell| marks.without_groups(cell)).collect();
+    let cells: Vec<&str> = plain.iter().map(AsRef::as_ref).collect();
+    let marks = Some(marks);
     let mut zone_text = dialect.time_zone.clone();
     let is_epw = dialect.format.as_deref() == Some("EPW");
     let syntax = if names.len() > 1
@@ -246,6 +250,7 @@ pub(crate) fn clock(
             takes_leap_seconds: false,
             cuts: false,
             parts_behind: None,
+            marks,
         });
     }
     let largest = doubts::largest(&cells);
@@ -296,6 +301,7 @@ pub(crate) fn clock(
         takes_leap_seconds: false,
         cuts: false,
         parts_behind: None,
+        marks,
     })
 }
 

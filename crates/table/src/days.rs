@@ -1,12 +1,15 @@
 //! Whether numbers are likely days: of a year, of spreadsheets, or Julian dates; times as numbers of units, and of a date with numbers behind it.
 
 use crate::civil;
+use crate::hint::hint;
 use crate::interval;
 use crate::named::OF_DAY;
+use crate::number as numbers;
 use crate::parts::Part;
 use crate::time::{SECOND, Time, Unit};
 use crate::written::{Clock, NO_TIME, Order, Problem, Syntax, number};
 use jiff::fmt::strtime;
+use std::borrow::Cow;
 use std::collections::HashSet;
 
 /// Whether the one column is called as dates are.
@@ -112,6 +115,22 @@ pub(crate) fn may_be_compact(names: &[&str], cells: &[&str]) -> bool {
 }
 
 impl Clock {
+    /// A number without marks between groups of digits.
+    pub(crate) fn without_groups<'a>(&self, text: &'a str) -> Result<Cow<'a, str>, Problem> {
+        let Some(marks) = self.marks else {
+            return Ok(Cow::Borrowed(text));
+        };
+        let text = marks.without_groups(text);
+        let other = if marks.decimal == b',' { '.' } else { ',' };
+        // Behind a point of a table of decimal commas there may be decimals, but three digits are likelier a group.
+        let is_group = |(whole, rest): (&str, &str)| rest.len() == 3 && whole.len() <= 3 && !whole.starts_with('0');
+        let has_mark = marks.thousands.is_some_and(|mark| text.contains(char::from(mark)));
+        match text.split_once(other) {
+            Some(parts) if has_mark || other == ',' || is_group(parts) => Err((numbers::NO_NUMBER, hint(&text))),
+            _ => Ok(text),
+        }
+    }
+
     /// A number of units of so many seconds since a zero.
     pub(crate) fn since(&self, text: &str, unit: i64, zero: i64) -> Result<Time, Problem> {
         let count = self.number(text, Unit::Seconds)?;

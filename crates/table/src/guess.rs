@@ -38,6 +38,7 @@ pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Doubt>> {
         takes_leap_seconds: true,
         cuts: true,
         parts_behind: None,
+        marks: None,
     };
     let all = |syntax: Syntax| {
         let utc = clock(syntax.clone(), Scale::Utc);

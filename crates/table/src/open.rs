@@ -9,7 +9,7 @@ use crate::lines::{Lines, Row, Split};
 use crate::profile::Profile;
 use crate::rows::Rows;
 use crate::table::Table;
-use crate::{json, known, names, number, source};
+use crate::{json, known, names, source};
 use std::io::{BufRead, Cursor, Read};
 
 impl Table {
@@ -206,11 +206,7 @@ fn named(own_names: &[String], units: &[String]) -> Vec<Column> {
 /// Profiles of the columns over the whole lines of the head.
 fn first_profiles(head: &Head, rows: &Rows, columns: &[Column], dialect: &Dialect) -> Vec<Profile> {
     let mut profiles = Profile::of_columns(columns.len());
-    let byte = |mark: char| mark as u32 as u8;
-    let syntax = number::Syntax {
-        decimal: dialect.decimal.map_or(b'.', byte),
-        thousands: dialect.thousands.map(byte),
-    };
+    let syntax = dialect.marks();
     let gaps: Vec<_> = columns
         .iter()
         .map(|column| dialect.missing_of(&column.name, &column.own_name))

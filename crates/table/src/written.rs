@@ -4,6 +4,7 @@ use crate::calendar;
 use crate::civil::{self, Zone, offset};
 pub(crate) use crate::civil::{AMBIGUOUS, NO_SUCH_DATE, Order, Problem};
 use crate::interval;
+use crate::number;
 use crate::parts::{Part, joined, padded, parts_of_second};
 use crate::quick;
 use crate::time::{DECIMALS, SECOND, Scale, Time, Unit};
@@ -113,6 +114,8 @@ pub(crate) struct Clock {
     pub(crate) cuts: bool,
     /// The last of several columns counts parts of a second of so many decimals, as `Milliseconds` and `nsecs` do.
     pub(crate) parts_behind: Option<u8>,
+    /// Marks in times that are numbers; `None` if a comma and a point may both stand before decimals.
+    pub(crate) marks: Option<number::Syntax>,
 }
 
 /// A zone by its name or offset.
@@ -136,6 +139,7 @@ impl Clock {
             takes_leap_seconds: false,
             cuts: false,
             parts_behind: None,
+            marks: None,
         }
     }
 
@@ -148,6 +152,7 @@ impl Clock {
     #[inline]
     pub(crate) fn quick(&self, text: &[u8]) -> Option<Time> {
         match self.syntax {
+            Syntax::Number(_) if self.marks.is_some_and(|marks| marks != number::Syntax::default()) => None,
             Syntax::Number(unit) => quick::ticks(text, unit.decimals()),
             Syntax::OfDay => quick::of_day(text),
             Syntax::Date(order) if self.zone.is_none() || self.scale == Scale::Utc => {
@@ -200,6 +205,7 @@ impl Clock {
     }
 
     pub(crate) fn number(&self, text: &str, unit: Unit) -> Result<Time, Problem> {
+        let text: &str = &self.without_groups(text)?;
         match number(text, unit) {
             Err(problem) if problem == TOO_FINE && self.cuts => {
                 // What is cut is less than a nanosecond.

@@ -185,3 +185,27 @@ fn marks_of_an_encoding_may_be_repeated() {
     let mut table = table;
     assert_eq!(rows(&mut table).rows, 2);
 }
+
+#[test]
+fn groups_of_digits_in_times_are_no_decimals() {
+    let text = "t,x\n999,5\n\"1,000\",6\n\"1,001\",7\n";
+    let message = refused(text);
+    assert!(
+        message.contains("line 3 (row 2), column `t`: `1,000`") && message.contains("--thousands ,"),
+        "{message}"
+    );
+    let grouped = |mark: char, text: &str| {
+        let said = Dialect {
+            thousands: Some(mark),
+            ..Dialect::default()
+        };
+        let mut table = open_said(text, &said).unwrap();
+        table.require_time().unwrap();
+        seconds(&rows(&mut table))
+    };
+    assert_eq!(grouped(',', text), [999.0, 1000.0, 1001.0]);
+    assert_eq!(grouped('.', "t;x\n999;5\n1.000;6\n1.001,5;7\n"), [999.0, 1000.0, 1001.5]);
+    assert_eq!(grouped(',', "t,x\n\"1,721,992,142.283\",5\n"), [1_721_992_142.283]);
+    // In a table of decimal commas, times have them.
+    assert_eq!(seconds(&rows(&mut open("t;x\n0,5;5,25\n1,5;6,25\n"))), [0.5, 1.5]);
+}
