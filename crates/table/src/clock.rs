@@ -10,7 +10,7 @@ use crate::guess::{self, Doubt};
 use crate::interval;
 use crate::named::{NAMES, OF_DAY, is_exact_name, is_time_name, starts_an_interval};
 use crate::parts::{Part, calendar, is_hour_and_minute, monthly, of_day_parts, parts};
-use crate::time::{Scale, Unit};
+use crate::time::{Scale, Time, Unit};
 use crate::written::{self, Clock, Order, Problem, Syntax};
 use std::borrow::Cow;
 
@@ -251,6 +251,7 @@ pub(crate) fn clock(
             cuts: false,
             parts_behind: None,
             marks,
+            largest: Time(i128::MAX),
         });
     }
     let largest = doubts::largest(&cells);
@@ -287,6 +288,10 @@ pub(crate) fn clock(
         _ if has_offset || zone_text.is_some() => Scale::Utc,
         _ => Scale::Local,
     };
+    let beyond = match (&syntax, &dialect.time_format) {
+        (Syntax::Number(unit), None) => doubts::most(&cells, *unit),
+        _ => Time(i128::MAX),
+    };
     if let (Syntax::Number(unit), None) = (&syntax, &dialect.time_format)
         && *unit != Unit::Seconds
     {
@@ -302,6 +307,7 @@ pub(crate) fn clock(
         cuts: false,
         parts_behind: None,
         marks,
+        largest: beyond,
     })
 }
 

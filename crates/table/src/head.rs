@@ -6,7 +6,7 @@ use std::io::BufRead;
 
 /// Largest number of lines and of bytes that are examined.
 const MAX_LINES: usize = 1000;
-const MAX_BYTES: usize = 1 << 18;
+pub(crate) const MAX_BYTES: usize = 1 << 18;
 
 /// The first lines of a text.
 pub(crate) struct Head {

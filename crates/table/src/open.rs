@@ -4,7 +4,7 @@ use crate::column::Column;
 use crate::detect::{self, Layout};
 use crate::dialect::{Delimiter, Dialect};
 use crate::error::{Error, Place};
-use crate::head::Head;
+use crate::head::{self, Head};
 use crate::lines::{Lines, Row, Split};
 use crate::profile::Profile;
 use crate::rows::Rows;
@@ -24,6 +24,13 @@ impl Table {
         let (mut reader, encoding) = source::text(Box::new(source), said.encoding.as_deref())?;
         dialect.encoding = dialect.encoding.or(encoding);
         let head = Head::read(&mut *reader)?;
+        if head.lines.is_empty() && head.bytes.len() >= head::MAX_BYTES {
+            return Err(Error::Line {
+                place: Place { line: 1, row: 0 },
+                problem: format!("the first {} bytes have no end of a line", head.bytes.len()),
+                mend: "take some of the columns, as: cut -d, -f1-1000 FILE | fewbits ... -",
+            });
+        }
         let first = head.bytes.iter().copied().find(|c| !c.is_ascii_whitespace());
         let is_object = first == Some(b'{') && said.delimiter.is_none();
         if first == Some(b'[') && head.bytes.contains(&b'{') {

@@ -13,6 +13,7 @@ fn clock(syntax: Syntax, scale: Scale) -> Clock {
         cuts: false,
         parts_behind: None,
         marks: None,
+        largest: Time(i128::MAX),
     }
 }
 

@@ -209,3 +209,60 @@ fn groups_of_digits_in_times_are_no_decimals() {
     // In a table of decimal commas, times have them.
     assert_eq!(seconds(&rows(&mut open("t;x\n0,5;5,25\n1,5;6,25\n"))), [0.5, 1.5]);
 }
+
+#[test]
+fn digits_without_marks_are_no_counts() {
+    let of = |name: &str, time: &dyn Fn(u32) -> u32| {
+        (0..90).fold(format!("{name},x\n"), |text, i| text + &format!("{},1\n", time(i)))
+    };
+    mend(&of("time", &|i| i / 60 * 100 + i % 60), "time of day whose digits have no marks");
+    mend(&of("time", &|i| (i % 24) * 100), "time of day whose digits have no marks");
+    mend(&of("time", &|i| 93_000 + i / 60 * 100 + i % 60), "time of day whose digits have no marks");
+    mend(&of("month", &|i| 202_001 + i / 12 * 100 + i % 12), "--time-format %Y%m");
+    mend(&of("year", &|i| 1990 + i), "--time-format %Y");
+    mend(&timed("Time (min.sec)", 2, |i| i / 100.0), "--time-format %M.%S");
+    // Counts with the same digits.
+    for step in [1, 7, 40, 100] {
+        let found = seconds(&rows(&mut open(&of("time", &|i| step * i))));
+        assert_eq!(found[89], f64::from(89 * step));
+    }
+}
+
+#[test]
+fn seconds_among_milliseconds_are_refused() {
+    let row = |i: u64| {
+        format!(
+            "{},1\n",
+            if i < 20 {
+                1_700_000_000 + i
+            } else {
+                1_700_000_020_000 + i
+            }
+        )
+    };
+    mend(&(0..30).fold("time,x\n".to_owned(), |text, i| text + &row(i)), "--time-format, as ms");
+    // Behind the first rows, which decide.
+    let row = |i: u64| {
+        format!(
+            "{},1\n",
+            if i < 4000 {
+                1_700_000_000 + i
+            } else {
+                1_700_000_020_000 + i
+            }
+        )
+    };
+    let message = refused(&(0..4001).fold("time,x\n".to_owned(), |text, i| text + &row(i)));
+    assert!(message.contains("line 4002 (row 4001)") && message.contains("of another unit"), "{message}");
+    // A clock that was not set yet.
+    let row = |i: u64| format!("{},1\n", if i < 20 { 1000 * i } else { 1_700_000_020_000 + 1000 * i });
+    let found = seconds(&rows(&mut open(&(0..30).fold("time,x\n".to_owned(), |text, i| text + &row(i)))));
+    assert_eq!((found[19], found[20]), (19.0, 1_700_000_040.0));
+}
+
+#[test]
+fn names_without_an_end_are_no_empty_file() {
+    let names: Vec<String> = (0..100_000).map(|i| format!("c{i}")).collect();
+    let message = refused(&(names.join(",") + "\n"));
+    assert!(message.contains("no end of a line") && message.contains("cut -d,"), "{message}");
+}
