@@ -96,6 +96,14 @@ pub(crate) enum Error {
     /// An output is an input, or another output.
     #[error("{output}: this is the same file as {other}: name another output")]
     SameFile { output: String, other: String },
+    /// The name of an output ends as that of a file of another kind.
+    #[error("{output}: {written} would be written, and the name ends in `.{ending}`: {mend}")]
+    Ending {
+        output: String,
+        ending: String,
+        written: &'static str,
+        mend: &'static str,
+    },
     /// Two of several files would be written to the same place.
     #[error("{output}: both {first} and {second} would be written there: give them other names, or pack them in turn")]
     SameOutput {

@@ -4,7 +4,9 @@
 //! spellings of a path are found too.
 
 use crate::arguments::{ReceiveOptions, TableOptions, Task};
+use crate::design_options::Form;
 use crate::error::Error;
+use crate::naming::{self, Written};
 use crate::{many, target};
 use fewbits_recipes::names;
 use std::fs::{File, Metadata};
@@ -218,6 +220,46 @@ impl Files {
     }
 }
 
+/// Refuses outputs whose names end as those of something else.
+fn check_names(task: &Task) -> Result<(), Error> {
+    let rows = |json: bool, written| if json { Written::Lines } else { written };
+    let (output, written, plot) = match task {
+        // What is continued has its name.
+        Task::Pack(options) if options.append => return Ok(()),
+        Task::Pack(options) => (&options.output, Written::Recording, &None),
+        Task::Repack(options) => (&options.output, Written::Recording, &None),
+        Task::Send(options) => (&options.output, Written::Recording, &None),
+        Task::Unpack(options) => (&options.output, Written::Table, &None),
+        Task::Cat(options) if options.every.is_some() => (&options.output, rows(options.json, Written::Csv), &None),
+        Task::Cat(options) => (&options.output, rows(options.json, Written::Table), &None),
+        Task::Receive(options) if options.format.is_some() || options.sensor.is_some() => {
+            (&options.output, Written::Csv, &None)
+        }
+        Task::Receive(options) => (&options.output, Written::Table, &None),
+        Task::Track(options) => (&options.output, rows(options.json, Written::Csv), &options.plot),
+        Task::Ranges(options) => (&options.output, rows(options.json, Written::Csv), &options.plot),
+        Task::Fit(options) => (&options.output, Written::Json, &None),
+        Task::Plan(options) => (&None, Written::Csv, &options.plot),
+        Task::Design(options) => {
+            let written = match options.form {
+                _ if options.json => Written::Json,
+                Form::Json => Written::Json,
+                Form::Table => Written::Text,
+                Form::C => Written::C,
+                Form::Rust => Written::Rust,
+            };
+            (&options.output, written, &options.plot)
+        }
+        _ => return Ok(()),
+    };
+    for (path, written) in [(output, written), (plot, Written::Drawing)] {
+        if let Some(path) = path {
+            naming::check(path, written)?;
+        }
+    }
+    Ok(())
+}
+
 /// Splits lists of names, of which clap hands on the whole text.
 fn split(lists: &mut Vec<String>, option: &'static str) -> Result<(), Error> {
     let mut names = Vec::new();
@@ -272,6 +314,7 @@ pub(crate) fn prepare(task: &mut Task) -> Result<(), Error> {
     }
     let files = Files::of(task);
     files.check()?;
+    check_names(task)?;
     target::set_live(files.is_live || files.reads.iter().any(|file| is_live(file)));
     Ok(())
 }

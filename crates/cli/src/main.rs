@@ -24,6 +24,7 @@ mod live;
 mod look;
 mod manifest;
 mod many;
+mod naming;
 mod node;
 mod notes;
 mod numbers;

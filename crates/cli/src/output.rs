@@ -132,8 +132,8 @@ impl Sheet {
 }
 
 /// Whether the file name has the extension of Parquet files.
-pub(crate) fn is_parquet(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension == "parquet")
+fn is_parquet(path: &Path) -> bool {
+    crate::naming::ending(path).as_deref() == Some("parquet")
 }
 
 /// Writes rows of a recording, as Parquet if the file name has that extension.

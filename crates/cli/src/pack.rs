@@ -213,6 +213,9 @@ fn continued(options: &TableOptions, schema: &Schema, file: &str) -> Result<Tabl
 /// Continues a recording. A table that is refused, a kill and a full disk leave it as it was, and of two commands the second is refused.
 fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, Option<Error>), Error> {
     let file = path.display().to_string();
+    if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+        return Err(Error::content(&file, "this is no file: a recording that is continued is read first"));
+    }
     let schema = Playback::open(path).map_err(Error::recording(&file))?.schema().clone();
     let table_options = continued(&options.table, &schema, &file)?;
     let open = || -> Result<Table, Error> {

@@ -106,7 +106,6 @@ fn copy(path: &Path, output: &Path) -> Result<(), Error> {
 
 fn one(options: &RepackOptions, file: &str) -> Result<Done, Error> {
     let path = Path::new(file);
-    let output = options.output.as_deref().unwrap_or(path);
     // A command that appends meanwhile would lose its rows.
     let lock = options.output.is_none().then(|| lock(path)).transpose()?;
     let failed = Error::recording(file);
@@ -125,8 +124,16 @@ fn one(options: &RepackOptions, file: &str) -> Result<Done, Error> {
     let summary = bounds::summary(schema.columns());
     let before = playback.bytes();
     let effort = if options.fast { Effort::Fast } else { Effort::Thorough };
-    let sink = Counted(Target::open(Some(output))?, 0);
-    let Counted(sink, after) = playback.repack(schema, sink, effort).map_err(&failed)?;
+    let target = match &options.output {
+        Some(output) => Target::open(Some(output))?,
+        None => Target::replacing(path)?,
+    };
+    let name = target.name().to_owned();
+    let repacked = playback.repack(schema, Counted(target, 0), effort);
+    let Counted(sink, after) = repacked.map_err(|error| match error {
+        fewbits_record::Error::Io { action: "write", .. } => Error::recording(&name)(error),
+        error => failed(error),
+    })?;
     if options.output.is_none() && after >= before {
         return Ok(Done::Kept("it would not be smaller"));
     }

@@ -2,7 +2,7 @@
 
 use crate::arguments::CatOptions;
 use crate::error::Error;
-use crate::output::{Cell, Shape, Sheet, is_parquet};
+use crate::output::{Cell, Shape, Sheet};
 use crate::say::say;
 use crate::unpack::{selection, warn_of_end};
 use crate::{Ending, clock, recording};
@@ -156,9 +156,6 @@ pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
     let Some((time, _, names, time_name)) = head else {
         return Ok(ending);
     };
-    if options.output.as_deref().is_some_and(is_parquet) {
-        return Err(Error::option("--output", "a Parquet file", "a CSV or JSON file with --every"));
-    }
     let asked = [options.mean, options.min, options.max, options.count];
     let none = !asked.contains(&true);
     let kinds: Vec<&Kind> = KINDS

@@ -58,23 +58,40 @@ pub(crate) struct Target {
     file: Option<File>,
     place: Place,
     name: String,
+    /// The earlier file, locked: two commands with live sources would each replace what the other has written.
+    _earlier: Option<File>,
 }
 
 impl Target {
-    /// Opens a file, or standard output.
+    /// Opens a file, or standard output. A file to which another command writes rows is refused.
     pub(crate) fn open(path: Option<&Path>) -> Result<Self, Error> {
         let Some(path) = path else {
             return Ok(Self {
                 file: None,
                 place: Place::Direct,
                 name: STANDARD_OUTPUT.to_owned(),
+                _earlier: None,
             });
         };
+        Self::at(path, true)
+    }
+
+    /// As [`open`](Self::open), for a file that this command has locked.
+    pub(crate) fn replacing(path: &Path) -> Result<Self, Error> {
+        Self::at(path, false)
+    }
+
+    fn at(path: &Path, locks: bool) -> Result<Self, Error> {
         let name = path.display().to_string();
         let failed = Error::io(&name, "create");
         // A link stays a link: the file that it names is replaced.
         let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
         let earlier = std::fs::metadata(&path).ok();
+        let lock = |file: &File| match locks && cfg!(unix) && matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+            true => Err(Error::content(&name, "another command writes to it: try again when it has ended")),
+            false => Ok(()),
+        };
+        let mut locked = None;
         let (file, place) = match earlier {
             // A pipe or a device is written to as it is; a folder is refused.
             Some(found) if !found.is_file() => {
@@ -86,14 +103,17 @@ impl Target {
                     .create_new(true)
                     .open(&path)
                     .map_err(&failed)?;
+                lock(&file)?;
                 (file, Place::New { path, is_empty: true })
             }
             earlier => {
                 // What may not be written to is not replaced either.
-                if earlier.is_some() {
-                    OpenOptions::new().write(true).open(&path).map_err(&failed)?;
-                }
                 let is_kept = is_live();
+                if earlier.is_some() {
+                    let file = OpenOptions::new().write(true).open(&path).map_err(&failed)?;
+                    lock(&file)?;
+                    locked = Some(file).filter(|_| is_kept);
+                }
                 let create = || beside(&path, &name);
                 let (file, temporary) = if is_kept { create() } else { interrupt::create(create) }?;
                 if let Some(earlier) = earlier
@@ -119,6 +139,7 @@ impl Target {
             file: Some(file),
             place,
             name,
+            _earlier: locked,
         })
     }
 
@@ -189,11 +210,11 @@ fn beside(path: &Path, name: &str) -> Result<(File, PathBuf), Error> {
                 return Ok((file, temporary));
             }
             Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => failure = Some(error),
-            Err(error) => return Err(Error::io(name, "create a file beside it for")(error)),
+            Err(error) => return Err(Error::io(name, "create a file beside it")(error)),
         }
     }
     let failure = failure.unwrap_or_else(|| std::io::ErrorKind::AlreadyExists.into());
-    Err(Error::io(name, "create a file beside it for")(failure))
+    Err(Error::io(name, "create a file beside it")(failure))
 }
 
 /// Unfinished files of each folder, as they were when this command first wrote there: to list a folder for each of many outputs takes

@@ -2,6 +2,7 @@
 
 use crate::arguments::{TableOptions, VerifyOptions};
 use crate::error::Error;
+use crate::files::is_regular;
 use crate::input::Table;
 use crate::opening::day_order;
 use crate::pack::own_tolerance;
@@ -9,7 +10,7 @@ use crate::rows::TableRows;
 use crate::{Ending, clock, numbers, output, recording, say};
 use fewbits_recipes::names;
 use fewbits_recipes::unpack::shown as shown_cell;
-use fewbits_recipes::verify::{CellFailure, Verdict, verify as recipe};
+use fewbits_recipes::verify::{CellFailure, Verdict, verify as recipe, verify_by_time};
 use fewbits_record::{Schema, TimeBase};
 use serde::Serialize;
 use std::fmt::Write;
@@ -23,6 +24,8 @@ struct Shown<'a> {
     ticks_failed: u64,
     missing_rows: u64,
     extra_rows: u64,
+    /// Whether rows with the same time were compared, and not those with the same number.
+    by_time: bool,
     damage: Option<&'a str>,
     /// Whether the recording has its end.
     finished: bool,
@@ -137,17 +140,28 @@ pub(crate) fn run(options: &VerifyOptions) -> Result<Ending, Error> {
     let file = options.packed.display().to_string();
     let mut playback = recording::open(&options.packed)?;
     let schema = playback.schema().clone();
-    let (table, matches) = match opened(&options.table, &schema) {
+    let again = || match opened(&options.table, &schema) {
         Err(Error::Refusal { file, source }) if source.is_day_or_month() => match day_order(&options.table)? {
-            Some(said) => opened(&said, &schema)?,
-            None => return Err(Error::Refusal { file, source }),
+            Some(said) => opened(&said, &schema),
+            None => Err(Error::Refusal { file, source }),
         },
-        other => other?,
+        other => other,
     };
+    let (table, matches) = again()?;
     let mut rows = TableRows::new(table, schema.time());
     let mut go = |_| ControlFlow::Continue(());
-    let verdict = recipe(&mut playback, &mut rows, &matches, &mut go).map_err(Error::recipe(&file))?;
-    let verdict = shown(&verdict, &schema, playback.is_finished());
+    let mut verdict = recipe(&mut playback, &mut rows, &matches, &mut go).map_err(Error::recipe(&file))?;
+    // Behind a lost row, the rows of one number are those of different times.
+    let has_lost = verdict.missing_rows > 0 || verdict.extra_rows > 0 || verdict.damage.is_some();
+    let mut by_time = false;
+    if has_lost && verdict.times_checked && is_regular(&options.table.file) {
+        let (table, matches) = again()?;
+        let mut rows = TableRows::new(table, schema.time());
+        let found = verify_by_time(&mut playback, &mut rows, &matches, &mut go).map_err(Error::recipe(&file))?;
+        by_time = found.is_some();
+        verdict = found.unwrap_or(verdict);
+    }
+    let verdict = shown(&verdict, &schema, playback.is_finished(), by_time);
     if options.json {
         output::json(&verdict)?;
     } else {
@@ -171,7 +185,7 @@ fn failure(failure: &CellFailure, schema: &Schema, name: &str) -> String {
     )
 }
 
-fn shown<'a>(verdict: &'a Verdict, schema: &Schema, finished: bool) -> Shown<'a> {
+fn shown<'a>(verdict: &'a Verdict, schema: &Schema, finished: bool, by_time: bool) -> Shown<'a> {
     let columns = verdict.columns.iter().map(|column| ShownColumn {
         name: &column.name,
         bound: &column.bound,
@@ -190,6 +204,7 @@ fn shown<'a>(verdict: &'a Verdict, schema: &Schema, finished: bool) -> Shown<'a>
         ticks_failed: verdict.ticks_failed,
         missing_rows: verdict.missing_rows,
         extra_rows: verdict.extra_rows,
+        by_time,
         damage: verdict.damage.as_deref(),
         finished,
         holds: verdict.holds,
@@ -228,13 +243,25 @@ fn text(verdict: &Shown<'_>) -> String {
         let _ = writeln!(text, "time: not compared, name the table's column with --time-column");
     }
     if let Some(damage) = verdict.damage {
-        let _ = writeln!(text, "{damage}; nothing was compared behind them");
+        let behind = if verdict.by_time {
+            ""
+        } else {
+            "; nothing was compared behind them"
+        };
+        let _ = writeln!(text, "{damage}{behind}");
+    }
+    if verdict.by_time {
+        let _ = writeln!(text, "rows with the same time were compared, as rows are missing");
     }
     if verdict.missing_rows > 0 {
-        let _ = writeln!(text, "{} rows are missing at the end", verdict.missing_rows);
+        let end = if verdict.by_time { "" } else { " at the end" };
+        let _ = writeln!(text, "{} rows are missing{end}", verdict.missing_rows);
     }
     if verdict.extra_rows > 0 {
-        let _ = writeln!(text, "the recording has more rows than the table, at least {}", verdict.extra_rows);
+        let _ = match verdict.by_time {
+            true => writeln!(text, "{} rows of the recording are not in the table", verdict.extra_rows),
+            false => writeln!(text, "the recording has more rows than the table, at least {}", verdict.extra_rows),
+        };
     }
     if !verdict.not_compared.is_empty() {
         let _ = writeln!(text, "not compared: {}", say::name(&names::shown(verdict.not_compared)));
@@ -243,6 +270,12 @@ fn text(verdict: &Shown<'_>) -> String {
         true => "all promises hold".to_owned(),
         false => format!("the promises of {} columns hold", verdict.columns.len()),
     };
-    let _ = writeln!(text, "{} rows: {}", verdict.rows, if verdict.holds { &all } else { "promises FAIL" });
+    let is_kept = verdict.ticks_failed == 0 && verdict.columns.iter().all(|column| column.failed == 0);
+    let all = match (verdict.holds, verdict.by_time && is_kept) {
+        (true, _) => &all,
+        (false, true) => "their promises hold, others are missing",
+        (false, false) => "promises FAIL",
+    };
+    let _ = writeln!(text, "{} rows: {all}", verdict.rows);
     text
 }

@@ -7,6 +7,10 @@ use fewbits_record::{Block, Column, Playback, TimeBase};
 use serde::Serialize;
 use std::io::{Read, Seek};
 
+mod by_time;
+
+pub use by_time::verify_by_time;
+
 /// Largest number of failures of a column that are kept.
 const MAX_FAILURES: usize = 3;
 
@@ -104,26 +108,7 @@ pub fn verify<R: Read + Seek>(
     watch: &mut Watch<'_>,
 ) -> Result<Verdict, Error> {
     let schema = playback.schema().clone();
-    let all = schema.columns();
-    if let Some(found) = matches.iter().copied().find(|index| *index >= all.len()) {
-        return Err(Error::Batch {
-            found,
-            expected: all.len(),
-        });
-    }
-    let compared: Vec<&Column> = matches.iter().map(|index| &all[*index]).collect();
-    let others = all.iter().enumerate().filter(|(index, _)| !matches.contains(index));
-    let mut verdict = Verdict {
-        rows: 0,
-        times_checked: false,
-        ticks_failed: 0,
-        missing_rows: 0,
-        extra_rows: 0,
-        damage: None,
-        holds: false,
-        columns: compared.iter().map(|column| ColumnVerdict::new(column)).collect(),
-        not_compared: others.map(|(_, column)| column.name().to_owned()).collect(),
-    };
+    let (mut verdict, compared) = Verdict::new(schema.columns(), matches)?;
     let mut rows = Rows {
         source,
         columns: matches.len(),
@@ -146,14 +131,44 @@ pub fn verify<R: Read + Seek>(
     while rows.advance()? {
         verdict.missing_rows += 1;
     }
-    verdict.holds = verdict.ticks_failed == 0
-        && verdict.missing_rows == 0
-        && verdict.extra_rows == 0
-        && verdict.columns.iter().all(|column| column.failed == 0);
+    verdict.judge();
     Ok(verdict)
 }
 
 impl Verdict {
+    /// Before the first row, and the columns that are compared.
+    fn new<'a>(all: &'a [Column], matches: &[usize]) -> Result<(Self, Vec<&'a Column>), Error> {
+        if let Some(found) = matches.iter().copied().find(|index| *index >= all.len()) {
+            return Err(Error::Batch {
+                found,
+                expected: all.len(),
+            });
+        }
+        let compared: Vec<&Column> = matches.iter().map(|index| &all[*index]).collect();
+        let others = all.iter().enumerate().filter(|(index, _)| !matches.contains(index));
+        let verdict = Self {
+            rows: 0,
+            times_checked: false,
+            ticks_failed: 0,
+            missing_rows: 0,
+            extra_rows: 0,
+            damage: None,
+            holds: false,
+            columns: compared.iter().map(|column| ColumnVerdict::new(column)).collect(),
+            not_compared: others.map(|(_, column)| column.name().to_owned()).collect(),
+        };
+        Ok((verdict, compared))
+    }
+
+    /// Sums up after the last row.
+    fn judge(&mut self) {
+        self.holds = self.damage.is_none()
+            && self.ticks_failed == 0
+            && self.missing_rows == 0
+            && self.extra_rows == 0
+            && self.columns.iter().all(|column| column.failed == 0);
+    }
+
     /// Compares the rows of a block.
     fn compare(
         &mut self,
@@ -175,30 +190,42 @@ impl Verdict {
                 self.times_checked = true;
                 self.ticks_failed += u64::from(ticks[original].abs_diff(*tick) > time.tolerance());
             }
-            for (i, (column, index)) in columns.iter().zip(matches).enumerate() {
-                let (sample, restored) = (rows.batch.columns[i][original], block.columns[*index][row]);
-                let found = &mut self.columns[i];
-                if let Some(error) = distance(column, sample, restored) {
-                    compared[i] += 1;
-                    found.largest_error = found.largest_error.max(error);
-                    // A running mean, which no large sum rounds.
-                    found.mean_error += (error - found.mean_error) / compared[i] as f64;
-                }
-                if column.keeps(sample, restored, block.share_bounds[*index]) {
-                    continue;
-                }
-                found.failed += 1;
-                if found.first_failures.len() < MAX_FAILURES {
-                    found.first_failures.push(CellFailure {
-                        row: self.rows,
-                        tick: *tick,
-                        sample,
-                        restored,
-                    });
-                }
-            }
+            self.compare_row((block, row), (&rows.batch, original), columns, matches, compared);
         }
         Ok(())
+    }
+
+    /// Compares a row of a block with one of a batch.
+    fn compare_row(
+        &mut self,
+        (block, row): (&Block, usize),
+        (batch, original): (&Batch, usize),
+        columns: &[&Column],
+        matches: &[usize],
+        compared: &mut [u64],
+    ) {
+        for (i, (column, index)) in columns.iter().zip(matches).enumerate() {
+            let (sample, restored) = (batch.columns[i][original], block.columns[*index][row]);
+            let found = &mut self.columns[i];
+            if let Some(error) = distance(column, sample, restored) {
+                compared[i] += 1;
+                found.largest_error = found.largest_error.max(error);
+                // A running mean, which no large sum rounds.
+                found.mean_error += (error - found.mean_error) / compared[i] as f64;
+            }
+            if column.keeps(sample, restored, block.share_bounds[*index]) {
+                continue;
+            }
+            found.failed += 1;
+            if found.first_failures.len() < MAX_FAILURES {
+                found.first_failures.push(CellFailure {
+                    row: self.rows,
+                    tick: block.ticks[row],
+                    sample,
+                    restored,
+                });
+            }
+        }
     }
 }
 

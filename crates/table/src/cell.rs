@@ -26,6 +26,9 @@ pub(crate) fn push_cell(
     meaning: &Meaning<'_>,
     words: &mut Words,
 ) -> Result<(), number::Problem> {
+    if matches!(cells, Cells::Words(_)) && text.contains('\0') {
+        return Err(("has NUL bytes, as after a loss of power", "leave such lines out with --skip-bad"));
+    }
     // A word that was there before is no gap.
     if let (Cells::Words(indices), true) = (&mut *cells, meaning.gaps.is_empty())
         && let Some(place) = words.place(text)

@@ -34,11 +34,21 @@ pub(crate) struct Written {
 /// The parts of a date with or without a time of day.
 pub(crate) fn written(text: &str, order: Order) -> Option<Written> {
     let text = text.trim();
-    let found = parts(text, order);
-    if found.is_some() {
+    let one = |text: &str| parts(text, order).or_else(|| parts(&arranged(text)?, Order::Ymd));
+    let found = one(text);
+    if found.as_ref().is_some_and(|found| found.zone != Zone::Unknown) {
         return found;
     }
-    parts(&arranged(text)?, Order::Ymd)
+    // An interval, as of hours of a market: its beginning.
+    let interval = || {
+        let is_mark = |mark: &&str| text.matches(*mark).count() == 1;
+        let mark = [" - ", " \u{2013} ", " / ", "/"].into_iter().find(is_mark)?;
+        let (begin, end) = text.split_once(mark)?;
+        let (begin, end) = (one(begin.trim())?, one(end.trim())?);
+        let is_before = (begin.date.ok()?, begin.second) < (end.date.ok()?, end.second);
+        is_before.then_some(begin)
+    };
+    interval().or(found)
 }
 
 fn parts(text: &str, order: Order) -> Option<Written> {

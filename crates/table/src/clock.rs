@@ -2,25 +2,17 @@
 
 use crate::civil;
 use crate::column::{Column, Kind};
-use crate::days::{self, by_name, has_date_name, may_be_compact, may_be_days, may_be_julian};
+use crate::days::{by_name, has_date_name, may_be_compact, may_be_days};
 use crate::dialect::Dialect;
+use crate::doubts;
 use crate::error::Error;
 use crate::guess::{self, Doubt};
 use crate::interval;
 use crate::named::{NAMES, OF_DAY, is_exact_name, is_time_name, starts_an_interval};
 use crate::parts::{Part, calendar, is_hour_and_minute, monthly, of_day_parts, parts};
-use crate::time::{Scale, Unit};
+use crate::time::{Scale, Time, Unit};
 use crate::written::{self, Clock, Order, Problem, Syntax};
-
-/// Seconds from 1970 to 2200: later times of a logger count from another year.
-const SECONDS_OF_2200: f64 = 7_258_118_400.0;
-/// Numbers of 100 nanoseconds since 1601 (file times of Windows) from 1997 to 2100, and since the year 1 (ticks of .NET) from 1966 to 2092. As
-/// nanoseconds since 1970 they are of 1973 to 1975 and of 1989 to 1990.
-const OTHER_ZEROS: [[f64; 2]; 2] = [[1.26e17, 1.58e17], [6.2e17, 6.6e17]];
-const OTHER_ZERO: (&str, &str) = (
-    "may count 100 ns since 1601 (Windows) or since the year 1 (.NET)",
-    "say --time-format ns if it counts nanoseconds since 1970; otherwise convert the column",
-);
+use std::borrow::Cow;
 
 /// What the cells of a column say of the time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -161,6 +153,26 @@ pub(crate) fn guess(
         .map(|column| vec![column])
 }
 
+/// The column of numbers that may be the time of day beside a date that most rows share, by its name.
+pub(crate) fn shared_date(columns: &[Column], samples: &[&[String]], time: &[usize]) -> Option<usize> {
+    let [date] = time else { return None };
+    let sample = samples[*date];
+    let is_same = sample.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    if sample.is_empty() || 2 * is_same < sample.len() || says(&columns[*date], sample, false) != Says::Day {
+        return None;
+    }
+    let is_clock = |i: &usize| {
+        let name = columns[*i].own_name.to_lowercase();
+        let mut words = name.split(|c: char| !c.is_alphanumeric());
+        let is_size = |cell: &String| cell.parse().is_ok_and(|x: f64| (0.0..=240_000.0).contains(&x));
+        i != date
+            && words.any(|word| OF_DAY.contains(&word) || word == "hour" || word == "hours")
+            && !samples[*i].is_empty()
+            && samples[*i].iter().all(is_size)
+    };
+    (0..columns.len()).find(is_clock)
+}
+
 /// The first column, if it alone states a unit of time and its numbers increase, as `Source [Second]` of an oscilloscope.
 fn by_unit(columns: &[Column], samples: &[&[String]]) -> Option<usize> {
     let is_stated = |column: &Column| {
@@ -197,7 +209,10 @@ pub(crate) fn clock(
     are_hours: Option<bool>,
     dialect: &mut Dialect,
 ) -> Result<Clock, Refused> {
-    let cells: Vec<&str> = sample.iter().map(String::as_str).collect();
+    let marks = dialect.marks();
+    let plain: Vec<Cow<'_, str>> = sample.iter().map(|cell| marks.without_groups(cell)).collect();
+    let cells: Vec<&str> = plain.iter().map(AsRef::as_ref).collect();
+    let marks = Some(marks);
     let mut zone_text = dialect.time_zone.clone();
     let is_epw = dialect.format.as_deref() == Some("EPW");
     let syntax = if names.len() > 1
@@ -235,37 +250,15 @@ pub(crate) fn clock(
             takes_leap_seconds: false,
             cuts: false,
             parts_behind: None,
+            marks,
+            largest: Time(i128::MAX),
         });
     }
-    if syntax == Syntax::Number(Unit::Seconds) && dialect.time_format.is_none() && may_be_days(names, &cells) {
-        return Err(Refused::Cell(0, days::DAYS));
-    }
-    if syntax == Syntax::Number(Unit::Seconds) && dialect.time_format.is_none() && may_be_julian(names, &cells) {
-        return Err(Refused::Cell(0, days::JULIAN));
-    }
-    if matches!(syntax, Syntax::Number(_)) && dialect.time_format.is_none() && may_be_compact(names, &cells) {
-        return Err(Refused::Cell(0, days::COMPACT));
-    }
-    let largest = || {
-        cells
-            .iter()
-            .filter_map(|cell| cell.parse::<f64>().ok())
-            .fold(0.0_f64, |most, x| most.max(x.abs()))
-    };
+    let largest = doubts::largest(&cells);
     if let (Syntax::Number(unit), None) = (&syntax, &dialect.time_format)
-        && *unit != Unit::Seconds
-        && largest() > SECONDS_OF_2200 * 10_f64.powi(i32::from(unit.decimals()))
+        && let Some(problem) = doubts::of_numbers(names, &cells, *unit)
     {
-        return Err(Refused::Cell(0, written::FAR));
-    }
-    if syntax == Syntax::Number(Unit::Nanoseconds)
-        && dialect.time_format.is_none()
-        && OTHER_ZEROS.iter().any(|[first, last]| {
-            let numbers = cells.iter().filter_map(|cell| cell.parse::<f64>().ok());
-            numbers.clone().next().is_some() && numbers.into_iter().all(|x| (*first..=*last).contains(&x))
-        })
-    {
-        return Err(Refused::Cell(0, OTHER_ZERO));
+        return Err(Refused::Cell(0, problem));
     }
     let has_offset = match &syntax {
         Syntax::Date(order) => cells.iter().any(|cell| guess::has_offset(cell, *order)),
@@ -287,13 +280,17 @@ pub(crate) fn clock(
         // Numbers of one unit that are smaller than its times since 1970 count from a zero of the logger.
         Syntax::Number(unit)
             if *unit != Unit::Seconds
-                && Unit::of_epoch(largest()).is_some_and(|found| found.decimals() >= unit.decimals()) =>
+                && Unit::of_epoch(largest).is_some_and(|found| found.decimals() >= unit.decimals()) =>
         {
             Scale::Utc
         }
         _ if !is_dated => Scale::Seconds,
         _ if has_offset || zone_text.is_some() => Scale::Utc,
         _ => Scale::Local,
+    };
+    let beyond = match (&syntax, &dialect.time_format) {
+        (Syntax::Number(unit), None) => doubts::most(&cells, *unit),
+        _ => Time(i128::MAX),
     };
     if let (Syntax::Number(unit), None) = (&syntax, &dialect.time_format)
         && *unit != Unit::Seconds
@@ -309,6 +306,8 @@ pub(crate) fn clock(
         takes_leap_seconds: false,
         cuts: false,
         parts_behind: None,
+        marks,
+        largest: beyond,
     })
 }
 

@@ -1,26 +1,16 @@
 //! Whether numbers are likely days: of a year, of spreadsheets, or Julian dates; times as numbers of units, and of a date with numbers behind it.
 
 use crate::civil;
+use crate::hint::hint;
 use crate::interval;
 use crate::named::OF_DAY;
+use crate::number as numbers;
 use crate::parts::Part;
 use crate::time::{SECOND, Time, Unit};
 use crate::written::{Clock, NO_TIME, Order, Problem, Syntax, number};
 use jiff::fmt::strtime;
+use std::borrow::Cow;
 use std::collections::HashSet;
-
-pub(crate) const DAYS: Problem = (
-    "may be a number of days, as spreadsheets have them",
-    "say --time-format excel, or --time-format s if these are seconds",
-);
-pub(crate) const JULIAN: Problem = (
-    "may be a Julian date, a number of days",
-    "say --time-format jd (or mjd), or --time-format s if these are seconds",
-);
-pub(crate) const COMPACT: Problem = (
-    "may be a date whose digits have no marks",
-    "say its format, as --time-format %y%m%d%H%M or %d%m%Y, or --time-format s if these are seconds",
-);
 
 /// Whether the one column is called as dates are.
 pub(crate) fn has_date_name(names: &[&str]) -> bool {
@@ -86,24 +76,6 @@ fn is_of_day_name(names: &[&str]) -> bool {
     matches!(names, [name] if WORDS.contains(&name.to_lowercase().as_str()))
 }
 
-/// Whether a column is named as one of Julian dates and has numbers of their size.
-pub(crate) fn may_be_julian(names: &[&str], cells: &[&str]) -> bool {
-    let [name] = names else { return false };
-    let name = name.to_lowercase();
-    let of = |words: &[&str]| {
-        name.split(|c: char| !c.is_ascii_alphanumeric())
-            .any(|word| words.contains(&word))
-    };
-    let within = |low: f64, high: f64| {
-        !cells.is_empty()
-            && cells
-                .iter()
-                .all(|cell| cell.parse().is_ok_and(|days: f64| (low..high).contains(&days)))
-    };
-    (of(&["jd", "bjd", "hjd", "julian"]) && within(2_300_000.0, 2_600_000.0))
-        || (of(&["mjd"]) && within(15_000.0, 90_000.0))
-}
-
 /// Whether a column of dates has numbers of the size of days since 1900.
 pub(crate) fn may_be_days(names: &[&str], cells: &[&str]) -> bool {
     let within = |low: f64, high: f64| {
@@ -143,6 +115,22 @@ pub(crate) fn may_be_compact(names: &[&str], cells: &[&str]) -> bool {
 }
 
 impl Clock {
+    /// A number without marks between groups of digits.
+    pub(crate) fn without_groups<'a>(&self, text: &'a str) -> Result<Cow<'a, str>, Problem> {
+        let Some(marks) = self.marks else {
+            return Ok(Cow::Borrowed(text));
+        };
+        let text = marks.without_groups(text);
+        let other = if marks.decimal == b',' { '.' } else { ',' };
+        // Behind a point of a table of decimal commas there may be decimals, but three digits are likelier a group.
+        let is_group = |(whole, rest): (&str, &str)| rest.len() == 3 && whole.len() <= 3 && !whole.starts_with('0');
+        let has_mark = marks.thousands.is_some_and(|mark| text.contains(char::from(mark)));
+        match text.split_once(other) {
+            Some(parts) if has_mark || other == ',' || is_group(parts) => Err((numbers::NO_NUMBER, hint(&text))),
+            _ => Ok(text),
+        }
+    }
+
     /// A number of units of so many seconds since a zero.
     pub(crate) fn since(&self, text: &str, unit: i64, zero: i64) -> Result<Time, Problem> {
         let count = self.number(text, Unit::Seconds)?;

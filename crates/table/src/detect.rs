@@ -104,6 +104,10 @@ pub(crate) fn detect(head: &Head, dialect: &mut Dialect) -> Result<Layout, Error
         // The names of rows have no name.
         rows[0].1.insert(0, String::new());
     }
+    if let (None, Some(mark @ ('.' | ','))) = (dialect.decimal, dialect.thousands) {
+        // One mark does not stand for both.
+        dialect.decimal = Some(if mark == '.' { ',' } else { '.' });
+    }
     if dialect.decimal.is_none() {
         let is_comma = delimiter != Delimiter::Byte(b',') && marks::has_decimal_commas(&rows);
         if let (false, None, Some((line, cell))) = (is_comma, dialect.thousands, marks::doubtful_groups(&rows)) {

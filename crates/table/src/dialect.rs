@@ -255,6 +255,15 @@ impl Dialect {
         options.join(" ")
     }
 
+    /// The marks in numbers.
+    pub(crate) fn marks(&self) -> crate::number::Syntax {
+        let byte = |mark: char| mark as u32 as u8;
+        crate::number::Syntax {
+            decimal: self.decimal.map_or(b'.', byte),
+            thousands: self.thousands.map(byte),
+        }
+    }
+
     /// The spellings of gaps of a column, given with its name or for all columns.
     pub(crate) fn missing_of(&self, name: &str, own_name: &str) -> crate::missing::Spellings {
         crate::missing::Spellings::new(self.missing.iter().filter_map(|word| match word.rsplit_once('=') {

@@ -1,7 +1,7 @@
 //! How the times of a column are written, by its cells.
 
 use crate::civil::{self, Zone, digits, is_compact};
-use crate::time::{Scale, Unit};
+use crate::time::{Scale, Time, Unit};
 use crate::written::{Clock, NAMED_ZONE, Order, Problem, Syntax};
 
 /// What cells leave open.
@@ -38,6 +38,8 @@ pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Doubt>> {
         takes_leap_seconds: true,
         cuts: true,
         parts_behind: None,
+        marks: None,
+        largest: Time(i128::MAX),
     };
     let all = |syntax: Syntax| {
         let utc = clock(syntax.clone(), Scale::Utc);

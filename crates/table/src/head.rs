@@ -6,7 +6,7 @@ use std::io::BufRead;
 
 /// Largest number of lines and of bytes that are examined.
 const MAX_LINES: usize = 1000;
-const MAX_BYTES: usize = 1 << 18;
+pub(crate) const MAX_BYTES: usize = 1 << 18;
 
 /// The first lines of a text.
 pub(crate) struct Head {
@@ -44,7 +44,8 @@ impl Head {
             let trimmed = line.len() - line.iter().rev().take_while(|c| matches!(c, b'\r' | b'\n')).count();
             line[..trimmed].split(|c| *c == b'\r')
         });
-        let text = |line: &[u8]| String::from_utf8_lossy(line).into_owned();
+        // Marks of an encoding, also several where files were joined.
+        let text = |line: &[u8]| String::from_utf8_lossy(line).trim_start_matches('\u{feff}').to_owned();
         let lines = (1..).zip(parts.map(text)).collect();
         Ok(Self { bytes, lines, end })
     }

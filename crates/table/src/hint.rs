@@ -36,6 +36,8 @@ pub(crate) fn hint(text: &str) -> &'static str {
         "if brackets mean a negative number, write a minus; or leave the column out with --without"
     } else if plain && digits > 1 && text.ends_with('-') {
         "if a minus behind the number makes it negative, write it in front; or leave the column out with --without"
+    } else if plain && commas == 1 && begins_with_zeros(text) {
+        "a cell of several parts is no number: leave the column out with --without"
     } else if plain && commas == 1 && points == 0 && text.len() - text.find(',').unwrap_or(0) == 4 {
         "say --thousands , if these are groups of digits, or --decimal , (with --delimiter ';' or tab) if they are decimals"
     } else if plain && commas == 1 && points == 0 {
@@ -52,6 +54,9 @@ pub(crate) fn hint(text: &str) -> &'static str {
         "say --thousands _"
     } else if plain && points > 2 {
         "say --thousands and the mark between groups"
+    } else if text.len() > 1 && text.bytes().all(|c| c.is_ascii_hexdigit()) {
+        "if a unit stands behind the number, say --strip-units; hexadecimal numbers are not read: convert the column, or leave it out with \
+         --without"
     } else if text.ends_with('%') || text.ends_with(|c: char| c.is_alphabetic()) && !text.contains('x') {
         "if a unit stands behind the number, say --strip-units"
     } else if text.starts_with("0x") || text.starts_with("0X") {
@@ -59,6 +64,12 @@ pub(crate) fn hint(text: &str) -> &'static str {
     } else {
         "mend the cell, name it with --missing, leave such lines out with --skip-bad, or the column with --without"
     }
+}
+
+/// Whether digits of a fixed number stand at the beginning, as in `-0020,1`.
+fn begins_with_zeros(text: &str) -> bool {
+    let digits = text.trim_start_matches(['+', '-']).as_bytes();
+    matches!(digits, [b'0', second, ..] if second.is_ascii_digit())
 }
 
 /// Signs that may stand before a number.

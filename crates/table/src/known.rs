@@ -12,6 +12,7 @@ pub(crate) fn needs_more(line: &[u8]) -> bool {
         b"#group",
         b"#datatype",
         b"\"Plot Title",
+        b" Format ",
     ]
     .iter()
     .any(|begin| line.starts_with(begin))
@@ -20,7 +21,6 @@ pub(crate) fn needs_more(line: &[u8]) -> bool {
 /// Sets what is known of a format by the first lines, with their numbers, and not said.
 pub(crate) fn recognise(lines: &[(u64, String)], dialect: &mut Dialect) {
     let Some((_, first)) = lines.first() else { return };
-    let first = first.trim_start_matches('\u{feff}');
     let bare = first.trim_start_matches('"');
     if is_tektronix(lines) && dialect.skip.is_none() && dialect.no_header.is_none() {
         // Tektronix oscilloscopes: settings in the first three columns beside the first rows, no names.
@@ -68,6 +68,15 @@ pub(crate) fn recognise(lines: &[(u64, String)], dialect: &mut Dialect) {
         // Rigol oscilloscopes: names, a line of units with the first time and the step, and rows without these two.
         set("Rigol", Some(0), true, 0, ",");
         dialect.short_rows = true;
+    } else if first.starts_with(" Format ") && first.contains("IAGA-2002") {
+        // Magnetic observatories: settings and comments that end in a bar, as the names do.
+        let names = lines
+            .iter()
+            .position(|(_, line)| line.starts_with("DATE ") && line.trim_end().ends_with('|'));
+        set(IAGA, names.map(|names| names as u64), false, 0, "spaces");
+        if dialect.missing.is_empty() {
+            dialect.missing = ["99999.00", "88888.00"].map(str::to_owned).to_vec();
+        }
     } else if first.starts_with("LOCATION,") {
         // EnergyPlus weather: eight lines or fewer, then rows without names.
         let data = lines.iter().position(|(_, line)| line.starts_with("DATA PERIODS"));
@@ -103,6 +112,8 @@ pub(crate) fn recognise(lines: &[(u64, String)], dialect: &mut Dialect) {
     }
 }
 
+/// Magnetic observatories.
+pub(crate) const IAGA: &str = "IAGA-2002";
 /// Oscilloscopes whose settings stand beside the first rows.
 pub(crate) const TEKTRONIX: &str = "Tektronix";
 /// Number of columns of these settings.

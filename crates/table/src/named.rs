@@ -3,7 +3,7 @@
 use crate::interval;
 
 /// Names of a column that is taken as time, if no column has dates.
-pub(crate) const NAMES: [&str; 33] = [
+pub(crate) const NAMES: [&str; 34] = [
     "time",
     "timestamp",
     "datetime",
@@ -13,6 +13,7 @@ pub(crate) const NAMES: [&str; 33] = [
     "epoch",
     "date_time",
     "date time",
+    "%time",
     "zeitstempel",
     "zeit",
     "datum",

@@ -1,12 +1,22 @@
 //! Numbers as loggers write them. What a double cannot hold is refused, never rounded in silence.
 
 use crate::hint::{BLANKS, SPACES, hint};
+use std::borrow::Cow;
 
 /// How numbers are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Syntax {
     pub(crate) decimal: u8,
     pub(crate) thousands: Option<u8>,
+}
+
+impl Syntax {
+    /// A number without the marks between its groups of digits; other texts as they are.
+    pub(crate) fn without_groups(self, text: &str) -> Cow<'_, str> {
+        let mark = self.thousands.map(char::from).filter(|mark| text.contains(*mark));
+        let plain = mark.and_then(|mark| grouped(text, mark, char::from(self.decimal)));
+        plain.map_or(Cow::Borrowed(text), Cow::Owned)
+    }
 }
 
 impl Default for Syntax {

@@ -56,6 +56,7 @@ pub(crate) fn calendar(columns: &[Column]) -> Option<Vec<usize>> {
         };
         found.push(part);
     }
+    days_of_years(&mut found);
     let is_date = found.contains(&Part::DayOfYear) || (found.contains(&Part::Month) && found.contains(&Part::Day));
     is_date.then(|| (first..first + found.len()).collect())
 }
@@ -76,7 +77,16 @@ pub(crate) fn parts(names: &[&str], sample: &[String]) -> Option<Vec<Part>> {
             None => return by_cells(names.len(), sample),
         }
     }
+    days_of_years(&mut found);
     (found.contains(&Part::Year) && found.len() >= 2).then_some(found)
+}
+
+/// Without a month, days are those of the year.
+fn days_of_years(found: &mut [Part]) {
+    if found.contains(&Part::Year) && !found.contains(&Part::Month) && !found.contains(&Part::DayOfYear) {
+        let days = found.iter_mut().filter(|part| **part == Part::Day);
+        days.for_each(|part| *part = Part::DayOfYear);
+    }
 }
 
 /// Meanings of columns of whole numbers in the order of a date: a year of four digits, month, day and so on, or the day of the year.

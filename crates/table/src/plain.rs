@@ -1,6 +1,6 @@
 //! Rows of plain cells, split where they lie in the buffer of the source: no copy, and a short number is read in the same pass.
 //!
-//! Whatever is odd (a quote, a comment, text beyond ASCII, too many cells) is left to [`Rows::next`](crate::open::Rows::next), which reads
+//! Whatever is odd (a quote, a comment, text beyond ASCII, too many cells) is left to [`Rows::next`](crate::rows::Rows::next), which reads
 //! the same line anew. So there is one meaning of a row; a test compares both ways cell by cell.
 
 use crate::number::{Syntax, TENS};

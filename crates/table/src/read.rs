@@ -1,9 +1,10 @@
 //! Reading: rows of text become cells of columns.
 
 use crate::cell::{Meaning, push_cell};
-use crate::column::{Batch, Cells};
+use crate::column::{Batch, Cells, Kind};
 use crate::error::{Error, Place, printable};
 use crate::guess::looks_like_time;
+use crate::missing;
 use crate::names;
 use crate::number::{self, Number};
 use crate::table::Table;
@@ -301,7 +302,26 @@ impl Table {
         if let Some(mend) = self.readings_mend(column, mend) {
             return self.refused(column, cell, problem, mend);
         }
-        let name = names::quoted(&printable(&self.columns[column].name));
-        self.refused(column, cell, problem, mend.replace("--without", &format!("--without {name}")))
+        // Other columns of the row that are none of numbers either are left out with the same option.
+        let is_other = |other: &&usize| {
+            **other == column
+                || (problem == number::NO_NUMBER
+                    && self.columns[**other].kind == Kind::Number
+                    && self.is_no_number(**other))
+        };
+        let names: Vec<String> = self
+            .selected
+            .iter()
+            .filter(is_other)
+            .map(|i| names::quoted(&printable(&self.columns[*i].name)))
+            .collect();
+        let mend = mend.replace("--without", &format!("--without {}", names.join(",")));
+        self.refused(column, cell, problem, mend)
+    }
+
+    /// Whether a cell of the row is neither a number nor a gap.
+    fn is_no_number(&self, column: usize) -> bool {
+        let (text, gaps) = (self.row.cell_text(column), &self.gaps[column]);
+        !missing::is_usual(text, true) && !gaps.has_text(text) && number::parse(text.as_bytes(), self.syntax).is_err()
     }
 }

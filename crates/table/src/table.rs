@@ -9,9 +9,9 @@ use crate::lines::Row;
 use crate::missing::Spellings;
 use crate::names;
 use crate::number;
-use crate::open::Rows;
 use crate::plain::Scanner;
 use crate::profile::Profile;
+use crate::rows::Rows;
 use crate::survey::Survey;
 use crate::words::Words;
 use crate::written::Clock;
@@ -70,11 +70,7 @@ impl Table {
         columns: Vec<Column>,
         profiles: Vec<Profile>,
     ) -> Result<Self, Error> {
-        let byte = |mark: char| mark as u32 as u8;
-        let syntax = number::Syntax {
-            decimal: dialect.decimal.map_or(b'.', byte),
-            thousands: dialect.thousands.map(byte),
-        };
+        let syntax = dialect.marks();
         let count = columns.len();
         let has_settings = dialect.format.as_deref() == Some(known::TEKTRONIX);
         let first = if has_settings { known::SETTINGS } else { 0 };

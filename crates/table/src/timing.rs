@@ -3,6 +3,7 @@
 use crate::clock::{self, Refused};
 use crate::error::{Error, Place, printable};
 use crate::interval;
+use crate::names;
 use crate::parts;
 use crate::table::Table;
 use crate::time::Scale;
@@ -42,6 +43,21 @@ impl Table {
         let samples: Vec<&[String]> = self.profiles.iter().map(|profile| profile.sample.as_slice()).collect();
         match clock::guess(&self.columns, &samples, &self.dialect, is_certain) {
             Some(mut columns) => {
+                if let ([date], Some(clock)) =
+                    (columns.as_slice(), clock::shared_date(&self.columns, &samples, &columns))
+                {
+                    let names = [*date, clock].map(|i| names::quoted(&printable(&self.columns[i].name)));
+                    let problem = "is a date that rows share, and another column may have the time of day";
+                    let mut error = self.time_refused(&columns, samples[*date], Refused::Cell(0, (problem, "")));
+                    if let Error::Cell { mend, .. } = &mut error {
+                        *mend = format!(
+                            "say --time-column {}, or --time-column {} for the date alone",
+                            names.join(","),
+                            names[0]
+                        );
+                    }
+                    return Err(error);
+                }
                 columns.extend(parts::parts_behind(&self.columns, &samples, &columns));
                 self.set_time_columns(columns).map(|()| true)
             }

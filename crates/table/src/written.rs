@@ -4,6 +4,7 @@ use crate::calendar;
 use crate::civil::{self, Zone, offset};
 pub(crate) use crate::civil::{AMBIGUOUS, NO_SUCH_DATE, Order, Problem};
 use crate::interval;
+use crate::number;
 use crate::parts::{Part, joined, padded, parts_of_second};
 use crate::quick;
 use crate::time::{DECIMALS, SECOND, Scale, Time, Unit};
@@ -31,6 +32,10 @@ pub(crate) enum Syntax {
 pub(crate) const NO_TIME: Problem = (
     "is not a time",
     "say how times are written with --time-format, as '%d.%m.%Y %H:%M', or name another column with --time-column; leave single rows out with --skip-bad",
+);
+const BEYOND: Problem = (
+    "is behind the year 2200, as if it were of another unit than others of the column",
+    "mend the cell, leave such rows out with --skip-bad, or say the unit with --time-format, as s",
 );
 const LEAP: Problem = (
     "is a leap second, which exact times cannot keep",
@@ -113,6 +118,10 @@ pub(crate) struct Clock {
     pub(crate) cuts: bool,
     /// The last of several columns counts parts of a second of so many decimals, as `Milliseconds` and `nsecs` do.
     pub(crate) parts_behind: Option<u8>,
+    /// Marks in times that are numbers; `None` if a comma and a point may both stand before decimals.
+    pub(crate) marks: Option<number::Syntax>,
+    /// Largest size of times that are numbers: beyond it they are likely of another unit.
+    pub(crate) largest: Time,
 }
 
 /// A zone by its name or offset.
@@ -136,6 +145,8 @@ impl Clock {
             takes_leap_seconds: false,
             cuts: false,
             parts_behind: None,
+            marks: None,
+            largest: Time(i128::MAX),
         }
     }
 
@@ -148,7 +159,8 @@ impl Clock {
     #[inline]
     pub(crate) fn quick(&self, text: &[u8]) -> Option<Time> {
         match self.syntax {
-            Syntax::Number(unit) => quick::ticks(text, unit.decimals()),
+            Syntax::Number(_) if self.marks.is_some_and(|marks| marks != number::Syntax::default()) => None,
+            Syntax::Number(unit) => quick::ticks(text, unit.decimals()).filter(|time| *time <= self.largest),
             Syntax::OfDay => quick::of_day(text),
             Syntax::Date(order) if self.zone.is_none() || self.scale == Scale::Utc => {
                 quick::date(text, order, self.scale)
@@ -165,7 +177,10 @@ impl Clock {
     fn slowly(&self, text: &str) -> Result<Time, Problem> {
         let text = text.trim();
         match &self.syntax {
-            Syntax::Number(unit) => self.number(text, *unit),
+            Syntax::Number(unit) => match self.number(text, *unit)? {
+                time if time > self.largest => Err(BEYOND),
+                time => Ok(time),
+            },
             Syntax::Since(unit, zero) => self.since(text, *unit, *zero),
             Syntax::Spelled => self.spelled(text),
             Syntax::OfDay => {
@@ -200,6 +215,7 @@ impl Clock {
     }
 
     pub(crate) fn number(&self, text: &str, unit: Unit) -> Result<Time, Problem> {
+        let text: &str = &self.without_groups(text)?;
         match number(text, unit) {
             Err(problem) if problem == TOO_FINE && self.cuts => {
                 // What is cut is less than a nanosecond.

@@ -193,7 +193,7 @@ impl<'a> Tables<'a> {
             say!("warning: {address}: {unused} frames were damaged or of another table and not used");
         }
         let has_refused_table = self.tables.iter().any(|table| table.writer.is_none());
-        Ok(match missing > 0 || has_refused_table {
+        Ok(match missing > 0 || uncounted > 0 || has_refused_table {
             true => Ending::Failed,
             false => Ending::Good,
         })

@@ -299,6 +299,10 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
     }
     sheet.finish()?;
     run.summary.copies = instants.copies;
+    if !instants.has_time() {
+        let hint = "no column has times: rows count as a second apart; if one has, name it with --time-column";
+        run.summary.hints.push(hint.to_owned());
+    }
     run.summary.hints.extend(turning.hints(&instants.names));
     let lines_of = |stuck: &Stuck| stuck.hints(&instants.names);
     run.summary.hints.extend(stuck.iter().flat_map(lines_of));

@@ -1,6 +1,6 @@
 //! Bounds and names on the command line, and what `verify` compares.
 
-use crate::{fewbits, folder, good, refused, table, text};
+use crate::{BOUND, fewbits, folder, good, refused, table, text};
 use std::path::Path;
 
 fn verdict(folder: &Path, words: &[&str]) -> (Option<i32>, serde_json::Value) {
@@ -163,4 +163,43 @@ fn verify_counts_rows_that_one_side_has() {
     assert!(code == Some(1) && found["extra_rows"].as_u64() > Some(0), "{found}");
     let (code, found) = verdict(&folder, &["long.csv", "a.fewb"]);
     assert_eq!((code, &found["missing_rows"]), (Some(1), &1.into()));
+}
+
+/// Behind lost rows, rows with the same number are others: those with the same time are compared.
+#[test]
+fn verify_compares_rows_of_one_time_where_rows_are_lost() {
+    let (_kept, folder) = folder();
+    let words = ["pack", "a.csv", "--time", "exact", "--bound", BOUND, "-o", "a.fewb"];
+    good(&folder, &words, b"");
+    let is_lost = |i: usize| (300..340).contains(&i) || i % 100 == 7;
+    let some: Vec<String> = table()
+        .lines()
+        .enumerate()
+        .filter(|(i, _)| !is_lost(*i))
+        .map(|(_, line)| format!("{line}\n"))
+        .collect();
+    std::fs::write(folder.join("some.csv"), some.concat()).unwrap();
+    let lost = (0..1001).filter(|i| is_lost(*i)).count() as u64;
+    let (code, found) = verdict(&folder, &["some.csv", "a.fewb"]);
+    assert_eq!((code, &found["by_time"], &found["extra_rows"]), (Some(1), &true.into(), &lost.into()), "{found}");
+    assert!(
+        found["columns"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .all(|column| column["failed"] == 0),
+        "{found}"
+    );
+    let wrong = some
+        .concat()
+        .replacen(&some[600], &some[600].replacen(',', ",77", 1), 1);
+    std::fs::write(folder.join("wrong.csv"), wrong).unwrap();
+    let (_, found) = verdict(&folder, &["wrong.csv", "a.fewb"]);
+    assert_eq!(found["columns"][0]["failed"], 1, "{found}");
+    // The other way round, from a pipe: by number, as it is read once.
+    good(&folder, &["pack", "some.csv", "--time", "exact", "-o", "some.fewb"], b"");
+    let output = fewbits(&folder, &["verify", "a.csv", "some.fewb"], b"");
+    let said = text(&output.stdout);
+    assert!(output.status.code() == Some(1) && said.contains(&format!("{lost} rows are missing")), "{said}");
+    assert!(said.contains("their promises hold, others are missing"), "{said}");
 }

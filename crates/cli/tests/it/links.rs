@@ -137,6 +137,21 @@ fn doubled_datagrams_give_their_rows_once_and_lost_ones_are_counted() {
     }
 }
 
+/// Without the last pieces of the header it is not known how many frames are missing: what is there is kept.
+#[test]
+fn lost_end_is_a_failure() {
+    let folder = tempfile::tempdir().unwrap();
+    let all = datagrams(folder.path(), &two_columns(), &[]);
+    let end = all.iter().rposition(|frame| frame[0] != 0).unwrap();
+    let one = receiver(folder.path(), &["-o", "day.csv"]);
+    deliver(&one.1, all[..=end].iter().cloned());
+    let (output, said) = ended(one);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("the end of the table did not arrive"), "{said}");
+    let kept = std::fs::read_to_string(folder.path().join("day.csv")).unwrap();
+    assert_eq!(kept, two_columns());
+}
+
 /// Noise, cut and inverted datagrams between those of a sender: its rows are all there, and nothing else.
 #[test]
 fn noise_enters_no_table() {

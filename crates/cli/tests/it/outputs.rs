@@ -1,6 +1,7 @@
 //! Outputs never destroy inputs, and a task that fails leaves earlier outputs as they were. Every test looks at the files afterwards.
 
-use crate::{fewbits, folder, good, refused, table, text};
+use crate::{fewbits, folder, good, refused, start, table, text, wait_for};
+use std::io::Write;
 use std::path::Path;
 
 /// All files of a folder with their bytes.
@@ -283,7 +284,7 @@ fn two_appenders_lose_nothing() {
     good(&folder, &["pack", "a.csv", "--time", "exact", "-o", "a.fewb"], b"");
     let mut expected = 1000;
     for _ in 0..5 {
-        let both = [(); 2].map(|()| crate::start(&folder, &["pack", "a.csv", "--append", "-o", "a.fewb"]));
+        let both = [(); 2].map(|()| start(&folder, &["pack", "a.csv", "--append", "-o", "a.fewb"]));
         for child in both {
             let output = child.wait_with_output().unwrap();
             match output.status.code() {
@@ -306,7 +307,7 @@ fn killed_append_leaves_the_recording_or_completes_it() {
     good(&folder, &["pack", "a.csv", "--time", "exact", "-o", "a.fewb"], b"");
     let mut rows = 1000;
     for wait in [4, 8, 12, 16, 20, 24, 28, 32, 40, 60] {
-        let mut child = crate::start(&folder, &["pack", "a.csv", "--append", "-o", "a.fewb"]);
+        let mut child = start(&folder, &["pack", "a.csv", "--append", "-o", "a.fewb"]);
         std::thread::sleep(std::time::Duration::from_millis(wait));
         let _ = child.kill();
         child.wait().unwrap();
@@ -334,4 +335,73 @@ fn appended_rows_follow() {
     assert_eq!(unpacked.lines().count(), 2001);
     let message = refused(&folder, &["pack", "a.csv", "-o", "a.fewb", "--append"], b"");
     assert!(message.contains("--columns"), "{message}");
+}
+
+/// A name that ends as that of something else is refused before anything is written, with what would write it.
+#[test]
+fn names_of_outputs_end_as_what_is_written() {
+    let (_kept, folder) = folder();
+    good(&folder, &["pack", "a.csv", "-o", "a.fewb"], b"");
+    let design = "design --prior normal:0,1 --noise 0.5 --bits 1 -o";
+    for (words, name, mend) in [
+        ("pack a.csv -o", "b.csv", "`.fewb`"),
+        ("pack a.csv -o", "b.fewb.gz", "pipe"),
+        ("send a.csv -o", "b.json", "`.fewb`"),
+        ("repack a.fewb --bound temp=±1 -o", "b.parquet", "`.fewb`"),
+        ("receive a.fewb -o", "b.FEWB", "fewbits pack - -o"),
+        ("receive a.fewb -o", "b.arrow", "`.parquet`"),
+        ("unpack a.fewb -o", "b.json", "fewbits cat --json"),
+        ("unpack a.fewb -o", "b.csv.zst", "pipe"),
+        ("cat a.fewb --json -o", "b.csv", "`.jsonl`"),
+        ("cat a.fewb --json -o", "b.parquet", "`.jsonl`"),
+        ("cat a.fewb --every 60s -o", "b.parquet", "`.csv`"),
+        ("track a.csv --columns temp -o", "b.parquet", "`.csv`"),
+        ("track a.csv --columns temp -o", "b.jsonl", "--json"),
+        ("track a.csv --columns temp --plot", "b.png", "`.svg`"),
+        ("fit a.csv -o", "b.csv", "`.json`"),
+        (design, "b.json", "--json"),
+    ] {
+        let all: Vec<&str> = words.split(' ').chain([name]).collect();
+        let message = refused(&folder, &all, b"");
+        assert!(message.contains(name) && message.contains(mend), "{words}: {message}");
+        assert!(!folder.join(name).exists());
+    }
+    // Other endings say nothing.
+    good(&folder, &["pack", "a.csv", "-o", "b.2024"], b"");
+    good(&folder, &["unpack", "a.fewb", "-o", "b.txt"], b"");
+}
+
+/// A second recorder into a file would put its own in place of the first one's, whose rows are then nowhere.
+#[cfg(unix)]
+#[test]
+fn second_recorder_into_one_file_is_refused() {
+    let (_kept, folder) = folder();
+    for earlier in [false, true] {
+        let words = ["pack", "-", "--deadline", "10ms", "-o", "w.fewb"];
+        if earlier {
+            good(&folder, &["pack", "a.csv", "-o", "w.fewb"], b"");
+        }
+        let before = files(&folder);
+        let mut first = start(&folder, &words);
+        first.stdin.as_mut().unwrap().write_all(table().as_bytes()).unwrap();
+        wait_for("the first recorder writes", || files(&folder) != before);
+        for words in [&words[..], &["pack", "a.csv", "-o", "w.fewb"]] {
+            let message = refused(&folder, words, table().as_bytes());
+            assert!(message.contains("w.fewb: another command writes to it"), "{message}");
+        }
+        drop(first.stdin.take());
+        assert!(first.wait().unwrap().success());
+        good(&folder, &["verify", "a.csv", "w.fewb"], b"");
+        std::fs::remove_file(folder.join("w.fewb")).unwrap();
+    }
+}
+
+/// What is read before it is continued is a file: a pipe would be waited for without an end.
+#[cfg(unix)]
+#[test]
+fn pipe_is_not_continued() {
+    let (_kept, folder) = folder();
+    let made = std::process::Command::new("mkfifo").arg(folder.join("pipe")).status();
+    assert!(made.unwrap().success());
+    assert!(refused(&folder, &["pack", "a.csv", "--append", "-o", "pipe"], b"").contains("this is no file"));
 }

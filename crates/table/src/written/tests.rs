@@ -12,6 +12,8 @@ fn clock(syntax: Syntax, scale: Scale) -> Clock {
         takes_leap_seconds: false,
         cuts: false,
         parts_behind: None,
+        marks: None,
+        largest: Time(i128::MAX),
     }
 }
 

@@ -4,6 +4,7 @@
 
 mod again;
 mod dialects;
+mod doubts;
 mod faults;
 mod fresh;
 mod kinds;
