@@ -22,6 +22,7 @@ mod estimate;
 mod fit;
 mod gaussian;
 mod heights;
+mod mirror;
 mod moved;
 mod odds;
 mod rest;
@@ -45,6 +46,7 @@ use fewbits_core::RangeNoise;
 use fewbits_numerics::error::{finite, refuse, within};
 use fit::Calibration;
 use gaussian::Step;
+use mirror::add_mirrored;
 use nalgebra::Vector3;
 use odds::{
     calibration_of, count_contradictions, drop_improbable, is_lost, merge_same, shares_of, uncertainty_of_noise, weigh,
@@ -347,6 +349,7 @@ impl RangeTracker {
         let taken = drop_improbable(next, known.negligible);
         if self.pushed.is_multiple_of(COMPARED) {
             merge_same(next);
+            add_mirrored(known, next);
         }
         Ok(taken)
     }

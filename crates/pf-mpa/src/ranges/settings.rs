@@ -1,5 +1,6 @@
 //! Settings of the range tracker.
 
+use super::mirror::Line;
 use crate::Error;
 use fewbits_numerics::error::{finite, non_negative, positive, refuse, within};
 use nalgebra::Vector3;
@@ -156,6 +157,8 @@ pub(super) struct Known {
     /// Middle of the anchors with the height's prior mean, and deviations of the position before the first range.
     pub(super) middle: [f64; 3],
     pub(super) spreads: [f64; 3],
+    /// The line that the anchors are nearly on.
+    pub(super) line: Option<Line>,
     /// The spread of the anchors.
     pub(super) anchors_spread: f64,
     /// Deviations of the bank, and the steps between them as lists.
@@ -258,6 +261,7 @@ impl RangeSettings {
             level,
             middle: [middle.x, middle.y, mean],
             spreads: [spread, spread, deviation],
+            line: Line::of(anchors),
             anchors_spread: spread,
             noises: steps(noise / noise_factor, noise, 2.0),
             speeds: steps(speed / speed_factor, speed * speed_factor, spacing),
