@@ -15,9 +15,6 @@ const MIXED: u32 = 5;
 const ANCHOR_CHANGES: f64 = 1e-3;
 /// Share of a range's score that stays in the sum of an anchor's scores.
 const SCORE_KEPT: f64 = 0.9;
-/// Share of a range's evidence that stays in the recent evidence, and by how many nats that of two hypotheses may differ without deciding.
-const RECALLED: f64 = 0.98;
-const UNDECIDED: f64 = 20.0;
 /// A filter of more weight in its hypothesis is kept, however improbable the hypothesis is.
 const LEAST_WEIGHT: f64 = 3e-3;
 /// One explanation of all ranges so far.
@@ -40,8 +37,8 @@ pub(super) struct Hypothesis {
     /// Ranges in a row for which the anchors that are left did not determine the position.
     pub(super) contradicted: usize,
     /// Decaying `ln` evidence while the ranges do not determine the state, and by how much it counts.
-    recent: f64,
-    behind: f64,
+    pub(super) recent: f64,
+    pub(super) behind: f64,
     /// Per anchor, the decaying sum of scores and that of their variances.
     scores: Vec<(f64, f64)>,
     ranges: u32,
@@ -247,28 +244,6 @@ impl Hypothesis {
         (0..self.good.len())
             .filter(|anchor| heard(*anchor) && self.good[*anchor] > 0.5 && self.apart != Some(*anchor))
             .count()
-    }
-
-    /// `ln` of its probability, up to a constant of all.
-    pub(super) fn log_share(&self) -> f64 {
-        self.log_weight - self.behind
-    }
-
-    /// Takes in the evidence of a range that determines the state.
-    pub(super) fn weigh(&mut self, log_evidence: f64) {
-        self.log_weight += log_evidence - self.behind;
-        (self.recent, self.behind) = (0.0, 0.0);
-    }
-
-    /// Takes in the evidence of a range that does not.
-    pub(super) fn recall(&mut self, log_evidence: f64) -> f64 {
-        self.recent = RECALLED * self.recent + log_evidence;
-        self.recent
-    }
-
-    /// Compares its recent evidence with the best one's.
-    pub(super) fn fall_behind(&mut self, best: f64) {
-        self.behind = (best - self.recent - UNDECIDED).max(0.0);
     }
 
     /// Updates with what arrived from an anchor whose range was [expected](Self::expect). `holds_scale`: the error of scale is not estimated

@@ -22,6 +22,7 @@ mod estimate;
 mod fit;
 mod gaussian;
 mod heights;
+mod mirror;
 mod moved;
 mod odds;
 mod rest;
@@ -45,16 +46,21 @@ use fewbits_core::RangeNoise;
 use fewbits_numerics::error::{finite, refuse, within};
 use fit::Calibration;
 use gaussian::Step;
+use mirror::add_mirrored;
 use nalgebra::Vector3;
-use odds::{count_contradictions, drop_improbable, is_lost, merge_same, shares_of, uncertainty_of_noise};
+use odds::{
+    calibration_of, count_contradictions, drop_improbable, is_lost, merge_same, shares_of, uncertainty_of_noise, weigh,
+};
 use rows::{Collected, Latest};
 use settings::{Known, NEGLIGIBLE_OF_LEVELS};
 use std::collections::BTreeMap;
 
 /// Ranges between two searches for hypotheses that have become the same.
 const COMPARED: usize = 8;
-/// Added to the variances of bias and scale when the track is lost, as a share of those before the first range.
-const LOST_SHARE: f64 = 0.04;
+/// Added to the variances of bias and scale over a silence, as a share of those before the first range.
+const SILENT_SHARE: f64 = 0.04;
+/// Deviation of the position before the first range after a loss, at most, in spreads of the anchors.
+const FARTHEST: f64 = 4.0;
 /// Bits of a range that is sent in full.
 const FULL_BITS: usize = 32;
 
@@ -170,7 +176,7 @@ impl RangeTracker {
         let anchor = self.number(anchor)?;
         let (is_new, elapsed) = (time > self.last, time - self.last);
         if elapsed > self.known.silence {
-            self.forget();
+            self.pause();
             self.collected.clear();
         }
         self.pushed += 1;
@@ -312,27 +318,24 @@ impl RangeTracker {
         let is_short = |one: &Hypothesis| {
             known.scale > 0.0 && one.usable(|other| last - heard[other] <= known.silence) < known.axes + 2
         };
-        // Evidence of ranges that every hypothesis can explain is evidence of little errors of the model. Only much of it decides.
         let is_undecided = next.iter().all(is_short);
-        let mut best = f64::NEG_INFINITY;
-        let holds_scale = |one: &mut Hypothesis| one.rests(known) || (!one.is_cut && is_short(one));
+        let mut evidences: Vec<(bool, f64)> = Vec::with_capacity(next.len());
         next.retain_mut(|one| {
-            let holds_scale = holds_scale(one);
+            let short = is_short(one);
+            let holds_scale = one.rests(known) || (!one.is_cut && short);
             match one.update(known, anchor, &arrived, holds_scale) {
-                Ok(log_evidence) if is_undecided => {
-                    best = best.max(one.recall(log_evidence));
-                    one.is_finite()
+                Ok(log_evidence) if one.is_finite() => {
+                    evidences.push((is_undecided || short && one.apart.is_some(), log_evidence));
+                    true
                 }
-                Ok(log_evidence) => {
-                    one.weigh(log_evidence);
-                    one.is_finite()
-                }
+                Ok(_) => false,
                 Err(error) => {
                     failed = Some(error);
                     false
                 }
             }
         });
+        weigh(next, &evidences);
         // Anchors that send ranges, but contradict each other so much that those that are left do not determine the position.
         count_contradictions(next, known.axes + 1, |other| last - heard[other] <= known.silence);
         // One anchor that is apart and others that contradict: an explanation that leaves too few anchors for a place is none beside others.
@@ -340,15 +343,13 @@ impl RangeTracker {
         if next.iter().any(is_enough) {
             next.retain(is_enough);
         }
-        if is_undecided {
-            next.iter_mut().for_each(|one| one.fall_behind(best));
-        }
         if next.is_empty() {
             return Err(failed.unwrap_or(Error::Impossible));
         }
         let taken = drop_improbable(next, known.negligible);
         if self.pushed.is_multiple_of(COMPARED) {
             merge_same(next);
+            add_mirrored(known, next);
         }
         Ok(taken)
     }
@@ -361,26 +362,34 @@ impl RangeTracker {
         estimate::of(&self.known, &self.hypotheses, lost)
     }
 
-    /// Starts acquisition again. The estimates of bias and scale are kept, with a larger variance.
-    fn forget(&mut self) {
+    /// Starts acquisition again after a silence. What all hypotheses together say of bias and scale is kept, with larger variances.
+    fn pause(&mut self) {
         let priors = [self.known.bias, self.known.scale].map(|deviation| deviation * deviation);
-        let best = self
-            .hypotheses
-            .iter()
-            .max_by(|a, b| a.log_share().total_cmp(&b.log_share()));
-        if let Some(moments) = best.and_then(Hypothesis::moments) {
-            for ((axis, prior), known) in [moments.bias(), moments.scale()]
-                .into_iter()
-                .zip(priors)
-                .zip(&mut self.calibration)
-            {
-                let (mean, variance) = (moments.mean[axis], moments.variance(axis) + LOST_SHARE * prior);
+        if let Some(found) = calibration_of(&self.hypotheses) {
+            for ((known, (mean, variance)), prior) in self.calibration.iter_mut().zip(found).zip(priors) {
+                let variance = variance + SILENT_SHARE * prior;
                 *known = if variance.is_finite() && mean * mean < 9.0 * prior {
                     (mean, variance.min(prior))
                 } else {
                     (0.0, prior)
                 };
             }
+        }
+        self.begin();
+    }
+
+    /// Starts acquisition again after the ranges have shown that no hypothesis is right: none of them says what bias and scale are.
+    fn forget(&mut self) {
+        self.calibration = [self.known.bias, self.known.scale].map(|deviation| (0.0, deviation * deviation));
+        self.begin();
+    }
+
+    fn begin(&mut self) {
+        // The target may be as far from the anchors as it was.
+        if let Some(found) = self.estimate(false) {
+            let (spread, middle) = (self.known.anchors_spread, Vector3::from(self.known.middle));
+            let far = (found.position - middle).xy().norm();
+            self.known.spreads[..2].fill(far.clamp(spread, FARTHEST * spread));
         }
         self.hypotheses.clear();
         self.tried = 0;

@@ -2,10 +2,17 @@
 
 use super::acquisition::is_same;
 use super::bank::Hypothesis;
+use super::fit::Calibration;
 use super::gaussian::Normal;
 
 /// A hypothesis whose probability is less than this share of the best one's is dropped in any case.
 const LEAST: f64 = 1e-5;
+
+/// Share of a range's evidence that stays in the recent evidence, and by how many nats that of two hypotheses may differ without deciding.
+const RECALLED: f64 = 0.98;
+const UNDECIDED: f64 = 20.0;
+/// By how many nats the recent evidence of a hypothesis that does not determine the state may exceed that of others that do, without deciding.
+const GAINED: f64 = 6.0;
 
 /// The track is lost if fewer than this share of the latest ranges agree.
 const AGREEMENT: f64 = 0.35;
@@ -26,6 +33,81 @@ pub(super) fn shares_of(hypotheses: &[Hypothesis]) -> Vec<f64> {
     let weights: Vec<f64> = hypotheses.iter().map(|one| (one.log_share() - best).exp()).collect();
     let total: f64 = weights.iter().sum();
     weights.iter().map(|weight| weight / total).collect()
+}
+
+/// Mean and variance of bias and scale by all hypotheses. `None` without any.
+pub(super) fn calibration_of(hypotheses: &[Hypothesis]) -> Option<Calibration> {
+    let state = hypotheses.first()?.moments()?;
+    let mut sums = [(0.0, 0.0); 2];
+    for (share, one) in shares_of(hypotheses).into_iter().zip(hypotheses) {
+        let (mean, covariance) = one.marginal(&[state.bias(), state.scale()]);
+        for (i, (sum, squares)) in sums.iter_mut().enumerate() {
+            *sum += share * mean[i];
+            *squares += share * (covariance[i][i] + mean[i] * mean[i]);
+        }
+    }
+    Some(sums.map(|(mean, square)| (mean, square - mean * mean)))
+}
+
+impl Hypothesis {
+    /// `ln` of its probability, up to a constant of all.
+    pub(super) fn log_share(&self) -> f64 {
+        self.log_weight - self.behind
+    }
+
+    /// Takes in the evidence of a range that determines the state.
+    fn weigh(&mut self, log_evidence: f64) {
+        self.log_weight += log_evidence - self.behind;
+        (self.recent, self.behind) = (0.0, 0.0);
+    }
+
+    /// Takes in the evidence of a range that does not, beside that of the others.
+    fn recall(&mut self, log_evidence: f64, others: f64) {
+        self.recent = RECALLED * self.recent + log_evidence - others;
+    }
+
+    /// Of its recent evidence beside that of hypotheses which determine the state, only what goes beyond the little errors of the model counts, and that
+    /// for good.
+    fn settle(&mut self, others: f64) {
+        let kept = self.recent.clamp(-UNDECIDED, GAINED);
+        self.log_weight += others + self.recent - kept - self.behind;
+        (self.recent, self.behind) = (kept, 0.0);
+    }
+}
+
+/// Takes in the evidence of a range: for each hypothesis whether the ranges leave it undetermined, and `ln` of the evidence. An undetermined hypothesis
+/// can explain almost any range, so its evidence is evidence of little errors of the model: only much of it decides.
+pub(super) fn weigh(hypotheses: &mut [Hypothesis], evidences: &[(bool, f64)]) {
+    let most = evidences.iter().map(|(_, one)| *one).fold(f64::NEG_INFINITY, f64::max);
+    let shares = shares_of(hypotheses);
+    let (mut sum, mut total) = (0.0, 0.0);
+    for (share, (is_undetermined, log_evidence)) in shares.iter().zip(evidences) {
+        if !is_undetermined {
+            sum += share * (log_evidence - most).exp();
+            total += share;
+        }
+    }
+    if total == 0.0 {
+        let mut best = f64::NEG_INFINITY;
+        for (one, (_, log_evidence)) in hypotheses.iter_mut().zip(evidences) {
+            one.recall(*log_evidence, most);
+            best = best.max(one.recent);
+        }
+        for one in hypotheses {
+            one.behind = (best - one.recent - UNDECIDED).max(0.0);
+        }
+        return;
+    }
+    // The evidence of those that are determined, together.
+    let others = most + (sum / total).ln();
+    for (one, (is_undetermined, log_evidence)) in hypotheses.iter_mut().zip(evidences) {
+        if *is_undetermined && others.is_finite() {
+            one.recall(*log_evidence, others);
+            one.settle(others);
+        } else {
+            one.weigh(*log_evidence);
+        }
+    }
 }
 
 /// Drops hypotheses that are improbable beside the best one. Returns what was taken off the `ln` of all weights: only differences matter.

@@ -1,5 +1,6 @@
 //! Settings of the range tracker.
 
+use super::mirror::Line;
 use crate::Error;
 use fewbits_numerics::error::{finite, non_negative, positive, refuse, within};
 use nalgebra::Vector3;
@@ -15,7 +16,7 @@ mod shares {
     pub(super) const BIAS: f64 = 0.2;
     pub(super) const ANCHOR_BIAS: f64 = 0.03;
     /// Probability that an anchor has a bias of its own of the size of the common one.
-    pub(super) const OUT_OF_PLACE: f64 = 0.01;
+    pub(super) const OUT_OF_PLACE: f64 = 0.03;
     pub(super) const STRAY: f64 = 4.0;
     /// Deviation of an estimated height, at least.
     pub(super) const HEIGHT: f64 = 0.5;
@@ -156,6 +157,10 @@ pub(super) struct Known {
     /// Middle of the anchors with the height's prior mean, and deviations of the position before the first range.
     pub(super) middle: [f64; 3],
     pub(super) spreads: [f64; 3],
+    /// The line that the anchors are nearly on.
+    pub(super) line: Option<Line>,
+    /// The spread of the anchors.
+    pub(super) anchors_spread: f64,
     /// Deviations of the bank, and the steps between them as lists.
     pub(super) noises: Vec<f64>,
     pub(super) speeds: Vec<f64>,
@@ -256,6 +261,8 @@ impl RangeSettings {
             level,
             middle: [middle.x, middle.y, mean],
             spreads: [spread, spread, deviation],
+            line: Line::of(anchors),
+            anchors_spread: spread,
             noises: steps(noise / noise_factor, noise, 2.0),
             speeds: steps(speed / speed_factor, speed * speed_factor, spacing),
             outliers: self.outliers,

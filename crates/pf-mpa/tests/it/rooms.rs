@@ -139,6 +139,12 @@ fn walk(room: &Room, seed: u64, travel: Travel, settings: RangeSettings) -> Outc
     outcome
 }
 
+/// One anchor that is .5 to 3 m too long.
+fn long_anchor(room: &Room, seed: u64) -> (usize, f64) {
+    let mut rng = Stream::new(seed).named("long").rng();
+    (rng.random_range(0..room.anchors.len()), 0.5 + 2.5 * rng.random::<f64>())
+}
+
 /// The rooms of these seeds. `long`: in each of at least four anchors, one is .5 to 3 m too long for good.
 fn measure(seeds: Range<u64>, travel: Travel, settings: RangeSettings, long: bool) -> (f64, usize) {
     let outcomes: Vec<(Room, Outcome)> = std::thread::scope(|scope| {
@@ -151,9 +157,7 @@ fn measure(seeds: Range<u64>, travel: Travel, settings: RangeSettings, long: boo
                         if room.anchors.len() < 4 {
                             return None;
                         }
-                        let mut rng = Stream::new(seed).named("long").rng();
-                        let anchor = rng.random_range(0..room.anchors.len());
-                        room.long = Some((anchor, 0.5 + 2.5 * rng.random::<f64>()));
+                        room.long = Some(long_anchor(&room, seed));
                     }
                     let outcome = walk(&room, seed, travel, settings);
                     Some((room, outcome))
@@ -239,6 +243,43 @@ fn no_confident_place_is_wrong() {
     for travel in TRAVELS {
         let (share, wrong) = measure(0..12, travel, none_alone(), false);
         assert!(wrong == 0 && share > 0.9, "{travel:?}: {wrong} rooms, bands hold {share}");
+    }
+}
+
+/// Defect: a lost track left its bias and scale to the next search, narrow and wrong, and the place was searched near the anchors though the target had
+/// been four spreads away.
+#[test]
+fn a_lost_track_says_nothing_of_bias_and_scale() {
+    for (seed, bits) in [(2139, 1), (2139, 2), (20808, 1)] {
+        let outcome = walk(&Room::random(seed), seed, Travel::Bits(bits), RangeSettings::default());
+        println!("{outcome:?}");
+        assert!(outcome.longest_wrong < LONG, "{outcome:?}");
+        assert!(10 * outcome.held > 8 * outcome.rows, "{outcome:?}");
+    }
+}
+
+/// Defect: where anchors are nearly on a line, a target that crossed it was followed on the other side, 50 m off in the end, under a narrow band.
+#[test]
+fn a_target_that_crosses_a_line_of_anchors_is_followed() {
+    let mut long = Room::random(40344);
+    long.long = Some(long_anchor(&long, 40344));
+    for (room, travel) in [(&Room::random(40344), Travel::Bits(2)), (&long, Travel::Full)] {
+        let outcome = walk(room, 40344, travel, RangeSettings::default());
+        let rms = (2.0 * outcome.squares / outcome.rows as f64).sqrt();
+        assert!(outcome.longest_wrong < LONG && rms < 4.0, "{rms}, {outcome:?}");
+    }
+}
+
+/// Defect: an explanation by one long anchor of four leaves three, which explain almost anything. It lost a little evidence with each range, since its
+/// places are a long curve, and a narrow wrong place was left; or it gained as little.
+#[test]
+fn little_evidence_decides_nothing_among_four_anchors() {
+    for seed in [20031, 20249] {
+        let mut room = Room::random(seed);
+        room.long = Some(long_anchor(&room, seed));
+        let outcome = walk(&room, seed, Travel::Full, RangeSettings::default());
+        println!("{outcome:?}");
+        assert!(outcome.longest_wrong < LONG, "{outcome:?}");
     }
 }
 
@@ -435,4 +476,70 @@ fn rooms_with_a_long_anchor() {
     let (share, wrong) = measure(from..from + rooms, Travel::Full, RangeSettings::default(), true);
     assert!(wrong == 0, "{wrong} rooms");
     assert!((0.93..=0.97).contains(&share), "bands hold {share}");
+}
+
+/// A target that creeps for four minutes along a line in a room of four anchors. Returns rows, rows held per coordinate, and the longest time wrong.
+fn creep(seed: u64, speed: Option<f64>, clock: bool) -> (usize, usize, usize) {
+    let mut rng = Stream::new(seed).named("creep").rng();
+    let anchors =
+        [[0.0, 0.0], [10.0, 0.0], [10.0, 8.0], [0.0, 8.0]].map(|[x, y]| (format!("{x} {y}"), Vector3::new(x, y, 0.0)));
+    let mut even = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
+    let start = Vector3::new(even(1.0, 9.0), even(1.0, 7.0), 0.0);
+    let speed = speed.unwrap_or_else(|| 1e-4 * 500.0_f64.powf(even(0.0, 1.0)));
+    let heading = even(0.0, std::f64::consts::TAU);
+    let velocity = speed * Vector3::new(heading.cos(), heading.sin(), 0.0);
+    let settings = RangeSettings {
+        unknown_clock: clock,
+        ..RangeSettings::default()
+    };
+    let mut tracker = RangeTracker::new(anchors.clone(), Travel::Full, settings).unwrap();
+    let noise = 0.02 * 5.0_f64.powf(rng.random::<f64>());
+    let (mut held, mut rows, mut wrong, mut longest, mut offset) = (0, 0, 0, 0, 500.0);
+    for k in 0..2400 {
+        let time = 0.1 * (k / 4) as f64;
+        let truth = start + time * velocity;
+        if clock && k % 4 == 0 {
+            offset += 5.0 * rng.sample::<f64, _>(StandardNormal);
+        }
+        let (name, place) = &anchors[k % 4];
+        let delay = if clock { offset } else { 0.0 };
+        let range = (truth - place).norm() + delay + noise * rng.sample::<f64, _>(StandardNormal);
+        let Some(found) = tracker.push(time, name, range).unwrap() else {
+            continue;
+        };
+        rows += 2;
+        held += (0..2)
+            .filter(|i| (found.bands[*i].0..=found.bands[*i].1).contains(&truth[*i]))
+            .count();
+        let nees = found.normalised_error(&truth).unwrap();
+        wrong = if nees > WRONG && !found.lost { wrong + 1 } else { 0 };
+        longest = longest.max(wrong);
+    }
+    (rows, held, longest)
+}
+
+/// Prints the share held over 50 places and speeds from .1 mm to 5 cm a second, and of targets that rest, with and without an unknown clock.
+#[test]
+#[ignore = "a minute"]
+fn fifty_creeping_targets() {
+    for (speed, clock) in [(None, false), (Some(0.0), false), (Some(0.0), true), (None, true)] {
+        let found: Vec<(usize, usize, usize)> = std::thread::scope(|scope| {
+            let runs = [0, 1]
+                .map(|odd| scope.spawn(move || (0..25).map(|k| creep(2 * k + odd, speed, clock)).collect::<Vec<_>>()));
+            runs.into_iter().flat_map(|run| run.join().unwrap()).collect()
+        });
+        let shares: Vec<f64> = found
+            .iter()
+            .map(|(rows, held, _)| *held as f64 / *rows as f64)
+            .collect();
+        let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+        let variance =
+            shares.iter().map(|share| (share - mean).powi(2)).sum::<f64>() / (shares.len() * (shares.len() - 1)) as f64;
+        let wrong = found.iter().filter(|(_, _, longest)| *longest >= LONG).count();
+        let least = shares.iter().copied().fold(1.0, f64::min);
+        println!(
+            "speed {speed:?}, clock {clock}: held {mean:.4} +- {:.4}, least {least:.3}, wrong in {wrong}",
+            variance.sqrt()
+        );
+    }
 }
