@@ -25,6 +25,22 @@ const ACCURACIES: [&str; 8] = [
     "uncertainty",
 ];
 
+/// Names of columns that say how good a fix is, or whose it is: no sensor measures them.
+const NO_LEVELS: [&str; 10] = [
+    "hdop",
+    "vdop",
+    "pdop",
+    "gdop",
+    "tdop",
+    "dop",
+    "mmsi",
+    "imo",
+    "satellites",
+    "sats",
+];
+const LATITUDES: [&str; 2] = ["lat", "latitude"];
+const LONGITUDES: [&str; 4] = ["lon", "lng", "long", "longitude"];
+
 /// What may be found of columns that no option names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Finds {
@@ -153,6 +169,33 @@ impl Roles {
             }
         }
         found
+    }
+
+    /// What to do if columns beside each other cannot measure one level, by their names, and no option chooses among them.
+    pub(super) fn mixed(&self, table: &Table) -> Option<String> {
+        let named = |those: &[&str]| {
+            let is_one = |name: &&String| words(name).first().is_some_and(|word| those.contains(&word.as_str()));
+            let own = |name: &&String| {
+                [&self.by, &self.accuracy]
+                    .iter()
+                    .all(|role| role.as_ref() != Some(*name))
+            };
+            table
+                .names
+                .iter()
+                .find(|name| is_one(name) && own(name))
+                .map(|name| crate::say::name(name))
+        };
+        if let (Some(lat), Some(lon)) = (named(&LATITUDES), named(&LONGITUDES)) {
+            return Some(format!("columns {lat} and {lon} do not measure one level: choose one with --columns"));
+        }
+        let name = named(&NO_LEVELS).filter(|_| table.names.len() > 1)?;
+        let dilution = if name.ends_with("dop") {
+            "; a column of standard deviations, the dilution times the error of a range, is an --accuracy-column"
+        } else {
+            ""
+        };
+        Some(format!("column {name} does not measure the level: say --without {name}{dilution}"))
     }
 
     /// What to do with a column of words, if rows may be readings of the sensors that it names.
