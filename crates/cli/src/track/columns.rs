@@ -38,8 +38,17 @@ const NO_LEVELS: [&str; 10] = [
     "satellites",
     "sats",
 ];
-const LATITUDES: [&str; 2] = ["lat", "latitude"];
-const LONGITUDES: [&str; 4] = ["lon", "lng", "long", "longitude"];
+/// Words of quantities: columns of two of them measure no common level.
+const QUANTITIES: [&[&str]; 8] = [
+    &["lat", "latitude"],
+    &["lon", "lng", "longitude"],
+    &["temp", "temperature"],
+    &["hum", "humidity", "rh"],
+    &["pressure", "baro", "barometer"],
+    &["co2"],
+    &["rssi", "snr"],
+    &["battery", "vbat", "voltage"],
+];
 
 /// What may be found of columns that no option names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -173,23 +182,41 @@ impl Roles {
 
     /// What to do if columns beside each other cannot measure one level, by their names, and no option chooses among them.
     pub(super) fn mixed(&self, table: &Table) -> Option<String> {
-        let named = |those: &[&str]| {
-            let is_one = |name: &&String| words(name).first().is_some_and(|word| those.contains(&word.as_str()));
-            let own = |name: &&String| {
-                [&self.by, &self.accuracy]
-                    .iter()
-                    .all(|role| role.as_ref() != Some(*name))
-            };
-            table
-                .names
+        let own = |name: &&String| {
+            [&self.by, &self.accuracy]
                 .iter()
-                .find(|name| is_one(name) && own(name))
-                .map(|name| crate::say::name(name))
+                .all(|role| role.as_ref() != Some(*name))
         };
-        if let (Some(lat), Some(lon)) = (named(&LATITUDES), named(&LONGITUDES)) {
-            return Some(format!("columns {lat} and {lon} do not measure one level: choose one with --columns"));
+        let quantity = |name: &String| {
+            let words = words(name);
+            let mut those = QUANTITIES
+                .iter()
+                .filter(|own| words.iter().any(|word| own.contains(&word.as_str())));
+            those.next().filter(|_| those.next().is_none())
+        };
+        let mut known = table
+            .names
+            .iter()
+            .filter(own)
+            .filter_map(|name| Some((name, quantity(name)?)));
+        if let Some((one, first)) = known.next() {
+            if let Some((other, _)) = known.find(|(_, quantity)| *quantity != first) {
+                let [one, other] = [one, other].map(|name| crate::say::name(name));
+                return Some(format!("columns {one} and {other} do not measure one level: choose with --columns"));
+            }
         }
-        let name = named(&NO_LEVELS).filter(|_| table.names.len() > 1)?;
+        let is_one = |name: &&String| {
+            words(name)
+                .first()
+                .is_some_and(|word| NO_LEVELS.contains(&word.as_str()))
+        };
+        let name = table
+            .names
+            .iter()
+            .filter(own)
+            .find(is_one)
+            .filter(|_| table.names.len() > 1)?;
+        let name = crate::say::name(name);
         let dilution = if name.ends_with("dop") {
             "; a column of standard deviations, the dilution times the error of a range, is an --accuracy-column"
         } else {

@@ -126,6 +126,10 @@ fn columns_that_measure_no_common_level_are_refused() {
     let (with, _) = tracked(&table, &["--columns", "east"]);
     assert_eq!(with, tracked(&table, &["--without", "lon,lat,hdop"]).0);
     tracked(&table, &["--columns", "lat,lon"]);
+    let rooms = table.replacen("east,hdop,lat,lon", "temp_a,temp_b,c,humidity", 1);
+    let problem = refused(folder.path(), &["track", "-"], rooms.as_bytes());
+    assert!(problem.contains("temp_a and humidity do not"), "{problem}");
+    tracked(&rooms, &["--without", "humidity"]);
 }
 
 /// Defect: where values come on change, silence was tested as a value by the grid: right silences were rejected, and the noise that was found at
