@@ -199,11 +199,11 @@ impl Roles {
             .iter()
             .filter(own)
             .filter_map(|name| Some((name, quantity(name)?)));
-        if let Some((one, first)) = known.next() {
-            if let Some((other, _)) = known.find(|(_, quantity)| *quantity != first) {
-                let [one, other] = [one, other].map(|name| crate::say::name(name));
-                return Some(format!("columns {one} and {other} do not measure one level: choose with --columns"));
-            }
+        if let Some((one, first)) = known.next()
+            && let Some((other, _)) = known.find(|(_, quantity)| *quantity != first)
+        {
+            let [one, other] = [one, other].map(|name| crate::say::name(name));
+            return Some(format!("columns {one} and {other} do not measure one level: choose with --columns"));
         }
         let is_one = |name: &&String| {
             words(name)
