@@ -205,6 +205,14 @@ impl<const M: usize> Censored<M> {
 }
 
 impl<const M: usize> Factor<M> for Censored<M> {
+    fn location(&self) -> Option<SVector<f64, M>> {
+        match &self.kind {
+            Kind::Value(factor) => factor.location(),
+            Kind::Ellipsoid(factor) => factor.location(),
+            Kind::Scalar(factor) => factor.location().map(|at| SVector::repeat(at[0])),
+        }
+    }
+
     fn log_likelihood(&self, m: &SVector<f64, M>) -> f64 {
         match &self.kind {
             Kind::Value(factor) => factor.log_likelihood(m),

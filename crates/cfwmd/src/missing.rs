@@ -99,6 +99,10 @@ impl<const M: usize> EllipsoidMissing<M> {
 }
 
 impl<const M: usize> Factor<M> for EllipsoidMissing<M> {
+    fn location(&self) -> Option<SVector<f64, M>> {
+        Some(self.prediction)
+    }
+
     fn log_likelihood(&self, m: &SVector<f64, M>) -> f64 {
         let mu = m - self.prediction;
         match self.missing {

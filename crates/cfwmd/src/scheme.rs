@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::censored::{Censored, MissingReports};
 use crate::rule::CensoringRule;
+use fewbits_core::circle::all_nearest;
 use fewbits_core::rand::Rng;
 use fewbits_core::{
     Deterministic, Gaussian, LinearSensing, Link, MeasurementNoise, NumberFormat, Observation, Scheme, Sensing,
@@ -67,7 +68,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
         value: &SVector<f64, M>,
         link: &Link,
     ) -> Result<Censored<M>, Error> {
-        let (prediction, arrival) = (self.sensing.mean(broadcast), link.of_received()?);
+        let (prediction, arrival) = (self.prediction_near(value, broadcast), link.of_received()?);
         let noise = self.sensing.noise_covariance_at(broadcast);
         if let NumberFormat::Fixed(levels) = &self.format {
             finite_over(link, value, &prediction)?;
@@ -76,6 +77,11 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
         }
         self.check_value(&prediction, value, link)?;
         Ok(Censored::value(value, &noise, arrival)?)
+    }
+
+    /// The predicted measurement; components on a circle are nearest to `value`.
+    fn prediction_near(&self, value: &SVector<f64, M>, broadcast: &SVector<f64, D>) -> SVector<f64, M> {
+        all_nearest(self.sensing.mean(broadcast), value, &self.sensing.periods())
     }
 
     /// Checks a received value: it is finite, the rule would have sent it against this prediction, and the link inverts no bits.
@@ -112,7 +118,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
         measurement: &SVector<f64, M>,
         broadcast: &SVector<f64, D>,
     ) -> Result<Option<SVector<f64, M>>, Error> {
-        let prediction = self.sensing.mean(broadcast);
+        let prediction = self.prediction_near(measurement, broadcast);
         all_finite("prediction", prediction.as_slice())?;
         send_if(&self.rule, measurement, &prediction, &self.format)
     }

@@ -60,7 +60,7 @@ pub fn update_through<const D: usize, const M: usize>(
     belief: &Gaussian<D>,
     observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
 ) -> Result<(Gaussian<D>, UpdateInfo<D, M>), Error> {
-    let (predicted, jacobian) = (observed.sensing.mean(belief.mean()), observed.sensing.jacobian(belief.mean()));
+    let (predicted, jacobian) = (observed.measured(belief.mean()), observed.sensing.jacobian(belief.mean()));
     update_at(belief, predicted, &jacobian, &observed.factor)
 }
 
@@ -85,7 +85,7 @@ pub(crate) fn evidence_through<const D: usize, const M: usize>(
     belief: &Gaussian<D>,
     observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
 ) -> Result<(f64, SVector<f64, M>), Error> {
-    let (predicted, jacobian) = (observed.sensing.mean(belief.mean()), observed.sensing.jacobian(belief.mean()));
+    let (predicted, jacobian) = (observed.measured(belief.mean()), observed.sensing.jacobian(belief.mean()));
     let Tilt { correction, tilted, .. } = tilt(belief, predicted, &jacobian, &observed.factor)?;
     if !(tilted.log_evidence.is_finite() && correction.iter().all(|x| x.is_finite())) {
         let what = "the evidence (from the belief, the sensing model or the factor)";

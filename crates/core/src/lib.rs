@@ -44,6 +44,7 @@ pub mod assumed_density;
 pub mod belief;
 pub mod bits;
 pub mod cell;
+pub mod circle;
 pub mod columns;
 pub mod dynamics;
 pub mod error;

@@ -240,7 +240,7 @@ const BLOCK: usize = 256;
 
 impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> Likelihood<D> for Observed<S, F, M> {
     fn log_likelihood(&self, state: &SVector<f64, D>) -> f64 {
-        self.factor.log_likelihood(&self.sensing.mean(state))
+        self.factor.log_likelihood(&self.measured(state))
     }
 
     fn add_log_likelihoods(&self, states: Columns<'_, D>, log_weights: &mut [f64]) {
@@ -253,6 +253,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> Likelihood<
             let here: Columns<'_, D> = states.map(|column| &column[start..start + count]);
             self.sensing
                 .mean_columns(&here, means.each_mut().map(|column| &mut column[..count]));
+            self.move_near(&mut means.each_mut().map(|column| &mut column[..count]));
             self.factor
                 .add_log_likelihoods(&means.each_ref().map(|column| &column[..count]), log_weights);
         }
@@ -262,7 +263,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> Likelihood<
     fn condition(&self, belief: &mut Gaussian<D>) -> Result<Evidence, Error> {
         if let Some((value, noise, log_scale)) = self.factor.as_value() {
             let jacobian = self.sensing.jacobian(belief.mean());
-            let innovation = value - self.sensing.mean(belief.mean());
+            let innovation = value - self.measured(belief.mean());
             let (posterior, info) = value_update::update(&jacobian, &noise, belief, &value, innovation)?;
             *belief = posterior;
             return Ok(Evidence::new(info.log_likelihood + log_scale, &(jacobian * (info.gain * innovation))));
@@ -295,7 +296,9 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> Likelihood<
     }
 
     fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<LinearScalar<D>> {
-        let factor = self.factor.as_scalar().filter(|_| M == 1)?;
+        // Nothing on a circle is linear.
+        let is_straight = self.sensing.periods().iter().all(Option::is_none);
+        let factor = self.factor.as_scalar().filter(|_| M == 1 && is_straight)?;
         let jacobian = self.sensing.jacobian(state);
         let matrix = SMatrix::<f64, 1, D>::from_fn(|_, d| jacobian[(0, d)]);
         let (mean, noise) = (self.sensing.mean(state)[0], self.sensing.noise_covariance_at(state)[(0, 0)]);

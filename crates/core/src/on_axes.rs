@@ -61,6 +61,10 @@ impl<S: Sensing<K, M>, const D: usize, const K: usize, const M: usize> Sensing<D
         self.sensing.sample(rng, &self.read(state))
     }
 
+    fn periods(&self) -> [Option<f64>; M] {
+        self.sensing.periods()
+    }
+
     fn mean_columns(&self, states: &Columns<'_, D>, means: ColumnsMut<'_, M>) {
         self.sensing.mean_columns(&self.axes.map(|axis| states[axis]), means);
     }

@@ -5,6 +5,7 @@
 //! [`Factor::tilted`] gives them: points are needed for `h` alone. With a linear `h` the update is that of
 //! [`assumed_density::update`](crate::assumed_density::update).
 
+use crate::circle::nearest;
 use crate::columns::{Columns, ColumnsMut, columns_agree, count, set_state, state_at};
 use crate::error::Error;
 use crate::factor::Factor;
@@ -106,7 +107,26 @@ pub(crate) fn move_points<const D: usize, const M: usize>(
     observed
         .sensing
         .mean_columns(&shared, measured.each_mut().map(Vec::as_mut_slice));
+    unwrap(&mut measured, weights, &observed.sensing.periods(), observed.on_circle(&observed.sensing.periods()));
     move_measured_points(states, weights, &measured.each_ref().map(Vec::as_slice), &observed.factor)
+}
+
+/// Measurements on a circle: each nearest to the first, then all moved together, their mean nearest to the factor's `location`.
+fn unwrap<const M: usize>(
+    measured: &mut [Vec<f64>; M],
+    weights: &[f64],
+    periods: &[Option<f64>; M],
+    location: Option<SVector<f64, M>>,
+) {
+    for (k, column) in measured.iter_mut().enumerate() {
+        let (Some(period), Some(first)) = (periods[k], column.first().copied()) else {
+            continue;
+        };
+        column.iter_mut().for_each(|m| *m = nearest(*m, first, period));
+        let mean: f64 = weights.iter().zip(&*column).map(|(w, m)| w * m).sum();
+        let turn = location.map_or(0.0, |location| nearest(mean, location[k], period) - mean);
+        column.iter_mut().for_each(|m| *m += turn);
+    }
 }
 
 /// Moves points whose weights sum to one so that they have the moments of the posterior. Returns the logarithm of the evidence and the

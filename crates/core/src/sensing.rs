@@ -21,6 +21,14 @@ pub trait Sensing<const D: usize, const M: usize>: Send + Sync {
     /// Draws a measurement of `state`.
     fn sample(&self, rng: &mut dyn Rng, state: &SVector<f64, D>) -> SVector<f64, M>;
 
+    /// Periods of the components that are angles or the like, in the unit of the measurement; `None` for a number on the line.
+    ///
+    /// A component with a period may have any of its values `m + k period`, in `mean` as in a measurement: residuals are taken by the
+    /// shorter way around ([`crate::circle`]). Without it a bearing that crosses from `pi` to `-pi` is off by a turn.
+    fn periods(&self) -> [Option<f64>; M] {
+        [None; M]
+    }
+
     /// Writes the noise-free measurement of every state to `means`. Writes NaN everywhere if lengths differ
     /// ([`crate::columns::measurements_agree`]). Override it if a loop over columns is faster than single calls.
     fn mean_columns(&self, states: &Columns<'_, D>, mut means: ColumnsMut<'_, M>) {

@@ -100,8 +100,55 @@ impl SensorField {
         Some(self.responses.get(age)?.get(sensor)?)
     }
 
+    pub(crate) fn is_steady(&self) -> bool {
+        self.ages[0].is_infinite()
+    }
+
+    pub(crate) fn domain(&self) -> &Arc<Domain> {
+        &self.domain
+    }
+
+    pub(crate) fn sensor_count(&self) -> usize {
+        self.sensors.len()
+    }
+
+    /// Response at an age that [`about`](Self::about) has found; not below zero.
+    pub(crate) fn response_at(&self, about: [(usize, f64); 2], sensor: usize, cell: usize) -> f64 {
+        let response = about.map(|(age, share)| share * self.responses[age][sensor][cell]);
+        (response[0] + response[1]).max(0.0)
+    }
+
+    /// Per age and sensor, and per free cell: standard deviation of the response over the cell, from those of its neighbours.
+    pub(crate) fn spreads(&self) -> Vec<Vec<Vec<f64>>> {
+        let grid = self.domain.grid();
+        let neighbours = |cell: &usize| -> Vec<[Option<usize>; 2]> {
+            let at = grid.place(*cell);
+            let next = |axis, up| {
+                grid.next(at, axis, up)
+                    .and_then(|next| self.domain.number(grid.index(next)))
+            };
+            (0..grid.dimension())
+                .map(|axis| [false, true].map(|up| next(axis, up)))
+                .collect()
+        };
+        let neighbours: Vec<_> = self.domain.free().iter().map(neighbours).collect();
+        // Of a slope along each axis a uniform place in the cell has this variance. Next to a wall the slope is that to the other side.
+        let spread = |field: &Vec<f64>, own: usize| {
+            let along = neighbours[own].iter().map(|pair| {
+                let steps = pair.map(|next| next.map_or(0.0, |next| (field[next] - field[own]).abs()));
+                steps[0].max(steps[1]).powi(2) / 12.0
+            });
+            along.sum::<f64>().sqrt()
+        };
+        let of = |field: &Vec<f64>| (0..field.len()).map(|cell| spread(field, cell)).collect();
+        self.responses
+            .iter()
+            .map(|fields| fields.iter().map(of).collect())
+            .collect()
+    }
+
     /// Indices of the two ages around an age, with their weights; weight zero before age 0.
-    fn about(&self, age: f64) -> [(usize, f64); 2] {
+    pub(crate) fn about(&self, age: f64) -> [(usize, f64); 2] {
         let next = self.ages.partition_point(|known| *known < age);
         let before = next.saturating_sub(1);
         match self.ages.get(next) {

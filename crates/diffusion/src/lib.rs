@@ -15,6 +15,7 @@
 //! | diffusivity, decay, the matrix, and where the substance goes | [`Transport`], [`Budget`] |
 //! | the concentration that sources cause: steady, in time | [`Steady::concentration`], [`Transient::run`] |
 //! | what a sensor measures of a source **anywhere** | [`SensorField`], [`Steady::adjoint`], [`Transient::step_responses`] |
+//! | where a leak is, in which room, since when, from readings of a few bits | [`LeakBelief`] |
 //!
 //! **Sensor responses are adjoint solutions.** A search for a source needs the response of a few sensors to a source in each of many
 //! cells. One solution with the transposed matrix per sensor gives it for all cells at once, with one factorisation for all sensors.
@@ -47,6 +48,8 @@ mod field;
 mod flow;
 pub mod gaden;
 mod grid;
+mod leak;
+mod leak_prior;
 mod plan;
 mod solver;
 mod steady;
@@ -60,6 +63,8 @@ pub use error::Error;
 pub use field::SensorField;
 pub use flow::Flow;
 pub use grid::Grid;
+pub use leak::LeakBelief;
+pub use leak_prior::{LeakPrior, Reading};
 pub use plan::Plan;
 pub use steady::{Source, Steady};
 pub use transient::{Method, Release, Snapshot, StepControl, Transient};

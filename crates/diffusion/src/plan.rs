@@ -13,6 +13,7 @@ use fewbits_numerics::error::{at_least_one, positive, refuse};
 /// | `A` | wall that absorbs |
 /// | `I` | air whose faces on the plan's edge are an inflow |
 /// | `O` | air whose faces on the plan's edge are an outflow |
+/// | `a` to `z` | air of the room that a line of its own names: `k = kitchen` |
 ///
 /// With squares of width `h`, line `r` is `y` from `r h` to `(r + 1) h` and column `i` is `x` from `i h` to `(i + 1) h`. Other parts of the
 /// plan's edge are closed.
@@ -28,6 +29,8 @@ use fewbits_numerics::error::{at_least_one, positive, refuse};
 pub struct Plan {
     /// Characters of the table. All lines have the same length.
     lines: Vec<Vec<char>>,
+    /// Letters of the rooms, increasing, each with its name.
+    rooms: Vec<(char, String)>,
 }
 
 impl Plan {
@@ -36,12 +39,51 @@ impl Plan {
     /// # Errors
     /// If a character is not in the table or lines differ in length; [`Error::NoFreeCell`] if there is no line.
     pub fn parse(text: &str) -> Result<Self, Error> {
-        let lines = || text.lines().filter(|line| !line.trim().is_empty());
+        let named = |line: &&str| line.contains('=');
+        let lines = || text.lines().filter(|line| !line.trim().is_empty() && !named(line));
         let indents = lines().map(|line| line.len() - line.trim_start().len());
         let indent = indents.min().ok_or(Error::NoFreeCell)?;
         let air = |character| if character == ' ' { '.' } else { character };
         let lines = lines().map(|line| line.chars().skip(indent).map(air).collect());
-        Self { lines: lines.collect() }.checked()
+        let lines: Vec<Vec<char>> = lines.collect();
+        let mut rooms = Vec::new();
+        for line in text.lines().filter(named) {
+            let (letter, name) = line.split_once('=').unwrap_or_default();
+            let mut letters = letter.trim().chars();
+            match (letters.next(), letters.next(), name.trim()) {
+                (Some(letter @ 'a'..='z'), None, name) if !name.is_empty() => rooms.push((letter, name.to_owned())),
+                _ => return refuse("plan", line.trim(), "a letter from a to z, = and the name of a room"),
+            }
+        }
+        rooms.sort();
+        if let Some(pair) = rooms.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            return refuse("plan", format!("two names of {}", pair[0].0), "one name for each letter");
+        }
+        Self { lines, rooms }.checked()
+    }
+
+    /// Names of the rooms, in the order of their letters.
+    pub fn rooms(&self) -> Vec<&str> {
+        self.rooms.iter().map(|room| room.1.as_str()).collect()
+    }
+
+    /// Of each free cell of a domain of this plan the index of its room in [`rooms`](Self::rooms); `None` for other air.
+    ///
+    /// # Errors
+    /// If the domain is not one of this plan.
+    pub fn rooms_of(&self, domain: &Domain) -> Result<Vec<Option<usize>>, Error> {
+        let [columns, lines, _] = domain.grid().counts();
+        let split = columns / self.lines[0].len();
+        if split == 0 || columns != split * self.lines[0].len() || lines != split * self.lines.len() {
+            let expected = format!("a domain of {} by {} squares", self.lines[0].len(), self.lines.len());
+            return refuse("domain", format!("{columns} by {lines} cells"), expected);
+        }
+        let room = |cell: &usize| {
+            let [column, line, _] = domain.grid().place(*cell);
+            let letter = self.lines[line / split][column / split];
+            self.rooms.iter().position(|room| room.0 == letter)
+        };
+        Ok(domain.free().iter().map(room).collect())
     }
 
     /// The plan with another character in some squares, given by column and line.
@@ -65,9 +107,12 @@ impl Plan {
                 let shown = format!("{} squares in line {r}", line.len());
                 return refuse("plan", shown, format!("{expected}, as in line 0"));
             }
-            if let Some(column) = line.iter().position(|character| !".#LAIO".contains(*character)) {
+            if let Some(column) = line
+                .iter()
+                .position(|c| !(".#LAIO".contains(*c) || self.rooms.iter().any(|room| room.0 == *c)))
+            {
                 let shown = format!("{:?} in line {r}, column {column}", line[column]);
-                return refuse("plan", shown, "one of . # L A I O");
+                return refuse("plan", shown, "one of . # L A I O, or a letter that a line as `k = kitchen` names");
             }
         }
         Ok(self)

@@ -115,7 +115,7 @@ impl<F: Differentiable<D, D>, const D: usize> GaussianDynamics<D> for AutoDynami
 
 /// Sensing `z = h(x) + w`, `w ~ N(0, R)`, of a [`Differentiable`] `h`.
 ///
-/// A bearing must not jump by a turn where the target is likely to be: points on both sides of the jump have no useful mean.
+/// If `h` is an angle, say so with [`Periodic`](fewbits_core::circle::Periodic) about this model: where it jumps by a turn, residuals are a turn off.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AutoSensing<F, const M: usize> {
     function: F,

@@ -18,6 +18,8 @@
 //! | linear in continuous time (Ornstein-Uhlenbeck, nearly constant velocity, random walk) | [`ContinuousLinear`], [`AffineGaussian`] |
 //! | dynamics and sensing of one's own, with Jacobians by automatic differentiation | [`AutoDynamics`], [`AutoSensing`], [`Flow`] |
 //! | linear sensing, scalar and vector | [`ScalarSensor`], [`LinearSensor`] |
+//! | bearing of a target, in radians or as a compass | [`Bearing`] |
+//! | received signal strength in dBm (RSSI) | [`LogDistance`] |
 //! | received amplitude that falls with distance | [`ReceivedPower`] |
 //! | a substance that diffuses through air, ground, vessels | [`diffusion`] |
 //! | concentrations from a source at sensors, in any medium | [`SourceModel`] |
@@ -39,22 +41,26 @@
 
 mod ar1;
 mod auto;
+mod bearing;
 mod beside;
 mod constant_velocity;
 mod continuous;
 pub mod diffusion;
 mod linear_gaussian;
 mod linear_sensor;
+mod log_distance;
 mod received_power;
 mod source_model;
 
 pub use ar1::Ar1;
 pub use auto::{AutoDynamics, AutoSensing, Differentiable, DualNum, Flow, Number};
+pub use bearing::Bearing;
 pub use constant_velocity::{constant_velocity_1d, constant_velocity_2d};
 pub use continuous::{AffineGaussian, ContinuousLinear, PLANE_POSITION};
 pub use fewbits_core::Error;
 pub use linear_gaussian::LinearGaussian;
 pub use linear_sensor::{LinearSensor, ScalarSensor};
+pub use log_distance::LogDistance;
 pub use received_power::ReceivedPower;
 pub use source_model::{Homogeneous, Receptor, SourceGradient, SourceModel};
 pub use {nalgebra, rand};

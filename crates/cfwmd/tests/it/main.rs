@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod centre;
+mod circle;
 mod fixtures;
 mod fusion;
 mod groups;

@@ -25,6 +25,31 @@ const ACCURACIES: [&str; 8] = [
     "uncertainty",
 ];
 
+/// Names of columns that say how good a fix is, or whose it is: no sensor measures them.
+const NO_LEVELS: [&str; 10] = [
+    "hdop",
+    "vdop",
+    "pdop",
+    "gdop",
+    "tdop",
+    "dop",
+    "mmsi",
+    "imo",
+    "satellites",
+    "sats",
+];
+/// Words of quantities: columns of two of them measure no common level.
+const QUANTITIES: [&[&str]; 8] = [
+    &["lat", "latitude"],
+    &["lon", "lng", "longitude"],
+    &["temp", "temperature"],
+    &["hum", "humidity", "rh"],
+    &["pressure", "baro", "barometer"],
+    &["co2"],
+    &["rssi", "snr"],
+    &["battery", "vbat", "voltage"],
+];
+
 /// What may be found of columns that no option names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Finds {
@@ -153,6 +178,51 @@ impl Roles {
             }
         }
         found
+    }
+
+    /// What to do if columns beside each other cannot measure one level, by their names, and no option chooses among them.
+    pub(super) fn mixed(&self, table: &Table) -> Option<String> {
+        let own = |name: &&String| {
+            [&self.by, &self.accuracy]
+                .iter()
+                .all(|role| role.as_ref() != Some(*name))
+        };
+        let quantity = |name: &String| {
+            let words = words(name);
+            let mut those = QUANTITIES
+                .iter()
+                .filter(|own| words.iter().any(|word| own.contains(&word.as_str())));
+            those.next().filter(|_| those.next().is_none())
+        };
+        let mut known = table
+            .names
+            .iter()
+            .filter(own)
+            .filter_map(|name| Some((name, quantity(name)?)));
+        if let Some((one, first)) = known.next()
+            && let Some((other, _)) = known.find(|(_, quantity)| *quantity != first)
+        {
+            let [one, other] = [one, other].map(|name| crate::say::name(name));
+            return Some(format!("columns {one} and {other} do not measure one level: choose with --columns"));
+        }
+        let is_one = |name: &&String| {
+            words(name)
+                .first()
+                .is_some_and(|word| NO_LEVELS.contains(&word.as_str()))
+        };
+        let name = table
+            .names
+            .iter()
+            .filter(own)
+            .find(is_one)
+            .filter(|_| table.names.len() > 1)?;
+        let name = crate::say::name(name);
+        let dilution = if name.ends_with("dop") {
+            "; a column of standard deviations, the dilution times the error of a range, is an --accuracy-column"
+        } else {
+            ""
+        };
+        Some(format!("column {name} does not measure the level: say --without {name}{dilution}"))
     }
 
     /// What to do with a column of words, if rows may be readings of the sensors that it names.

@@ -134,7 +134,8 @@ fn apart(first: &[Instant], names: &[String]) -> Option<String> {
         .collect();
     (!apart.is_empty()).then(|| {
         format!(
-            "constant offsets from the others: {}: --align {} takes them off; without it they count as noise",
+            "constant offsets from the others: {}: --align {} takes them off; without it they count as noise; if columns measure different \
+             things, choose with --columns",
             apart.join(", "),
             first.len()
         )

@@ -1,7 +1,7 @@
 //! Conversion of rows of a table to instants: what each sensor reported at one time.
 
 use super::applied::Correction;
-use super::columns::{Kind, Roles};
+use super::columns::{Finds, Kind, Roles};
 use super::held::Held;
 use super::instant::{Instant, Qualifier, Reports};
 use super::late::Late;
@@ -102,7 +102,8 @@ impl Instants {
             return Err(Error::empty(table.file(), "columns of values"));
         }
         let has_limits = table.take_limits();
-        if let Some(hint) = roles.hint(&table) {
+        let is_levels = kind.finds == Finds::Levels && chosen.columns.is_empty();
+        if let Some(hint) = roles.hint(&table).or_else(|| roles.mixed(&table).filter(|_| is_levels)) {
             return Err(Error::content(table.file(), hint));
         }
         table.require_numbers()?;

@@ -170,7 +170,7 @@ fn track_tells_of_noise_that_is_not_as_supposed() {
         } else {
             table
         };
-        let output = crate::fewbits(folder.path(), &["track", "-"], table.as_bytes());
+        let output = fewbits(folder.path(), &["track", "-"], table.as_bytes());
         text(&output.stderr)
     };
     for (kind, line) in [

@@ -110,6 +110,28 @@ fn columns_that_are_no_sensors_are_seen_by_their_names() {
     assert!(problem.contains("say --by state"), "{problem}");
 }
 
+/// Defect: dilutions of precision, numbers of ships, and longitudes beside latitudes were sensors of one level: its estimates were nonsense.
+#[test]
+fn columns_that_measure_no_common_level_are_refused() {
+    let mut numbers = Numbers(617);
+    let mut table = "time,east,hdop,lat,lon\n".to_owned();
+    for row in 0..300 {
+        let east = 0.1 * f64::from(row) + numbers.normal();
+        table += &format!("{row},{east},{},{},{}\n", 1 + row % 3, 50.0 + 1e-5 * east, 10.0 - 1e-5 * east);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let problem = |options: &[&str]| refused(folder.path(), &[&["track", "-"], options].concat(), table.as_bytes());
+    assert!(problem(&[]).contains("lat and lon do not measure one level"));
+    assert!(problem(&["--without", "lon,lat"]).contains("--without hdop"));
+    let (with, _) = tracked(&table, &["--columns", "east"]);
+    assert_eq!(with, tracked(&table, &["--without", "lon,lat,hdop"]).0);
+    tracked(&table, &["--columns", "lat,lon"]);
+    let rooms = table.replacen("east,hdop,lat,lon", "temp_a,temp_b,c,humidity", 1);
+    let problem = refused(folder.path(), &["track", "-"], rooms.as_bytes());
+    assert!(problem.contains("temp_a and humidity do not"), "{problem}");
+    tracked(&rooms, &["--without", "humidity"]);
+}
+
 /// Defect: where values come on change, silence was tested as a value by the grid: right silences were rejected, and the noise that was found at
 /// the lower end of its search made more of them.
 #[test]

@@ -61,6 +61,13 @@ pub trait Factor<const M: usize>: Send + Sync {
     /// is not finite; [`Error::NotConverged`] if a quadrature does not reach its accuracy.
     fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error>;
 
+    /// The value, or the middle of the edges, about which measurements on a circle are taken ([`crate::circle`]); `None` if there is none. By
+    /// default that of [`as_value`](Self::as_value) or [`as_scalar`](Self::as_scalar).
+    fn location(&self) -> Option<SVector<f64, M>> {
+        let of_scalar = || self.as_scalar()?.location().map(|at| SVector::repeat(at[0]));
+        self.as_value().map(|(value, ..)| value).or_else(of_scalar)
+    }
+
     /// This factor as a [`Scalar`]; `None` if it is none. Filters that impute measurements call it.
     fn as_scalar(&self) -> Option<Scalar> {
         None
@@ -154,6 +161,10 @@ impl<const M: usize, F: Factor<M> + ?Sized> Factor<M> for &F {
 
     fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
         (**self).tilted(prior)
+    }
+
+    fn location(&self) -> Option<SVector<f64, M>> {
+        (**self).location()
     }
 
     fn as_scalar(&self) -> Option<Scalar> {

@@ -1,6 +1,7 @@
 //! Several observations of one measurement.
 
 use super::moments::{Feature, tilted_by_quadrature};
+use super::scalar::middle;
 use super::{Factor, Scalar, Tilted, add_mapped};
 use crate::columns::{Columns, lengths_agree};
 use crate::error::Error;
@@ -48,6 +49,10 @@ impl Factor<1> for Repeated {
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
         let add = |means: &Columns<'_, 1>, logs: &mut [f64]| self.factor.add_log_likelihoods(means, logs);
         add_mapped(means, log_weights, add, |logs| logs.iter_mut().for_each(|log| *log *= self.count as f64));
+    }
+
+    fn location(&self) -> Option<SVector<f64, 1>> {
+        self.factor.location()
     }
 
     fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
@@ -114,6 +119,10 @@ impl Factor<1> for Product {
                 factor.add_log_likelihoods(means, log_weights);
             }
         }
+    }
+
+    fn location(&self) -> Option<SVector<f64, 1>> {
+        middle(self.features())
     }
 
     /// A single factor uses its closed form if it has one; several factors use quadrature.

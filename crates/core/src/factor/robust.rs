@@ -66,6 +66,10 @@ impl<const M: usize, F: Factor<M>> Factor<M> for Robust<F> {
         add_mapped(means, log_weights, add, |logs| logs.iter_mut().for_each(|log| *log = self.mixed(*log)));
     }
 
+    fn location(&self) -> Option<SVector<f64, M>> {
+        self.factor.location()
+    }
+
     fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
         let own = match self.factor.tilted(prior) {
             Ok(own) => own,

@@ -53,6 +53,10 @@ impl<const M: usize> Factor<M> for Constant {
         Tilted::unchanged(prior, self.probability.ln())
     }
 
+    fn location(&self) -> Option<SVector<f64, M>> {
+        None
+    }
+
     fn as_scalar(&self) -> Option<Scalar> {
         Some((*self).into())
     }
@@ -105,12 +109,25 @@ impl Factor<1> for Scalar {
         delegate!(self, factor => factor.tilted(prior))
     }
 
+    fn location(&self) -> Option<SVector<f64, 1>> {
+        middle(self.features().into_iter())
+    }
+
     fn as_scalar(&self) -> Option<Scalar> {
         match self {
             Self::Value(value) => value.as_scalar(),
             Self::Levels(levels) => levels.as_scalar(),
         }
     }
+}
+
+/// The middle between the first and the last of the places where a likelihood changes.
+pub(super) fn middle(features: impl Iterator<Item = Feature>) -> Option<SVector<f64, 1>> {
+    let ends = features.fold(None, |ends: Option<(f64, f64)>, feature| {
+        let (low, high) = ends.unwrap_or((feature.location, feature.location));
+        Some((low.min(feature.location), high.max(feature.location)))
+    });
+    ends.map(|(low, high)| [0.5 * (low + high)].into())
 }
 
 impl From<Value<1>> for Scalar {

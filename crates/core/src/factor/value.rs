@@ -133,6 +133,10 @@ impl<const M: usize> Factor<M> for Value<M> {
         }
     }
 
+    fn location(&self) -> Option<SVector<f64, M>> {
+        Some(*self.value())
+    }
+
     fn as_scalar(&self) -> Option<Scalar> {
         let variance = self.noise_covariance().iter().next().filter(|_| M == 1)?;
         let one = Value::scalar(self.value()[0], *variance).and_then(|one| one.times_exp(self.log_scale));

@@ -16,6 +16,7 @@ mod field;
 mod fixtures;
 mod gaden;
 mod laws;
+mod leak;
 mod refusals;
 mod round;
 mod slab;

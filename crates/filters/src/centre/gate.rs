@@ -156,7 +156,10 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         else {
             return true;
         };
-        member.state.repeats.agrees(value, spread + noise)
+        member
+            .state
+            .repeats
+            .agrees(value, spread + noise, member.sensor.period())
     }
 
     /// A prediction wide enough that most of the reports that were rejected agree with it and with each other; `None` if there is none, or

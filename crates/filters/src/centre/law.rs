@@ -6,6 +6,7 @@ use super::reading::{Content, Reading, Tested, conditioned};
 use super::{FusionCentre, Member, RemoteSensor};
 use crate::Error;
 use crate::contract::{Points, StateFilter};
+use fewbits_core::circle::nearest;
 use fewbits_core::{BitString, Evidence, Gaussian, Likelihood, Observation};
 use nalgebra::SVector;
 
@@ -136,10 +137,19 @@ impl<const D: usize> Parts<'_, D> {
 
     /// What a sensor measures at the mean of each part, without noise.
     fn measured(&self, sensor: &dyn RemoteSensor<D>) -> Option<Vec<f64>> {
-        match self {
-            Self::Points(points) => (0..self.len()).map(|i| sensor.measured(&points.point(i))).collect(),
-            Self::Modes(modes) => modes.iter().map(|(_, mode)| sensor.measured(mode.mean())).collect(),
+        let mut all: Vec<f64> = match self {
+            Self::Points(points) => (0..self.len())
+                .map(|i| sensor.measured(&points.point(i)))
+                .collect::<Option<_>>()?,
+            Self::Modes(modes) => modes
+                .iter()
+                .map(|(_, mode)| sensor.measured(mode.mean()))
+                .collect::<Option<_>>()?,
+        };
+        if let (Some(period), Some(first)) = (sensor.period(), all.first().copied()) {
+            all.iter_mut().for_each(|m| *m = nearest(*m, first, period));
         }
+        Some(all)
     }
 
     /// Of each part `ln p` of an observation, and the correction of the measurement by it: none of a point.

@@ -87,6 +87,11 @@ pub trait RemoteSensor<const D: usize>: Send + Sync {
     fn measured(&self, _state: &SVector<f64, D>) -> Option<f64> {
         None
     }
+
+    /// Period of the first coordinate of the measurement, if it is on a circle ([`fewbits_core::circle`]).
+    fn period(&self) -> Option<f64> {
+        None
+    }
 }
 
 /// How a report of a sensor that sends values is tested.
@@ -290,6 +295,10 @@ where
     fn measured(&self, state: &SVector<f64, D>) -> Option<f64> {
         self.sensing.mean(state).iter().next().copied()
     }
+
+    fn period(&self) -> Option<f64> {
+        self.sensing.periods().first().copied().flatten()
+    }
 }
 
 /// A product of factors of the one component of a measurement (`M` is 1), times a constant.
@@ -320,6 +329,10 @@ impl Joint {
 }
 
 impl<const M: usize> Factor<M> for Joint {
+    fn location(&self) -> Option<SVector<f64, M>> {
+        self.product.location().map(|at| SVector::repeat(at[0]))
+    }
+
     fn log_likelihood(&self, m: &SVector<f64, M>) -> f64 {
         self.log_scale + self.product.log_likelihood(&[m[0]].into())
     }

@@ -9,6 +9,7 @@
 //! Values that are rounded coarsely repeat while the level rests, however often they changed before. So only a sensor is judged whose values moved by
 //! less than a quarter of its noise at least once: rounding to such steps is less than one part in 190 of the noise's variance.
 
+use crate::calibration::wrapped;
 use fewbits_numerics::Runs;
 use serde::{Deserialize, Serialize};
 
@@ -59,10 +60,10 @@ impl Repeats {
 
     /// Whether a value agrees with the one before it, whose difference has this variance. A repetition of a sensor that hardly ever repeats itself does
     /// not: wild values are often all the same.
-    pub(crate) fn agrees(&self, value: f64, variance: f64) -> bool {
+    pub(crate) fn agrees(&self, value: f64, variance: f64, period: Option<f64>) -> bool {
         let Some(last) = self.runs.last else { return true };
         let is_repeated = last == value && self.is_seldom() && self.runs.pairs > 0;
-        !is_repeated && (value - last).powi(2) <= AGREES * variance
+        !is_repeated && wrapped(value - last, period).powi(2) <= AGREES * variance
     }
 
     fn is_seldom(&self) -> bool {

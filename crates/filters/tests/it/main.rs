@@ -6,6 +6,7 @@
 mod backward_simulation;
 mod calibration;
 mod centre;
+mod circle;
 mod contract;
 mod failure;
 mod fit;

@@ -16,6 +16,8 @@ struct Sensor {
     reports: u64,
     bits: u64,
     lost: u64,
+    is_asked: bool,
+    /// `None` before the first question: nothing is known then.
     working: Option<f64>,
     dead: bool,
     excluded: bool,
@@ -51,8 +53,9 @@ impl Metrics {
                 Some(Observation::Lost) => sensor.lost += 1,
                 _ => {}
             }
+            sensor.is_asked |= step.asked.get(i).copied().unwrap_or(false);
             if let Some(health) = step.health.get(i) {
-                sensor.working = Some(health.working);
+                sensor.working = sensor.is_asked.then_some(health.working);
                 (sensor.dead, sensor.excluded) = (health.dead, health.excluded);
             }
         }
@@ -89,7 +92,7 @@ impl fmt::Display for Metrics {
                 writeln!(f, "fewbits_{name}{{sensor=\"{}\"}} {}", sensor.number, value(sensor))?;
             }
         }
-        head(f, "sensor_working", "gauge", "Probability that a sensor works.")?;
+        head(f, "sensor_working", "gauge", "Probability that a sensor works; none before it was asked.")?;
         for sensor in &self.sensors {
             if let Some(working) = sensor.working {
                 writeln!(f, "fewbits_sensor_working{{sensor=\"{}\"}} {}", sensor.number, number(working))?;
@@ -147,21 +150,31 @@ mod tests {
         let mut metrics = Metrics::default();
         let word = Observation::Received(BitString::from_bytes(vec![0xa0], 3).unwrap_or_default());
         for slot in 1..=3 {
-            let mut step = Step::new(slot, vec![word.clone(), Observation::Lost], vec![(1.5, f64::INFINITY)]);
+            let mut step = Step::new(
+                slot,
+                vec![word.clone(), Observation::Lost, Observation::Nothing],
+                vec![(1.5, f64::INFINITY)],
+            );
             let health = |dead| SensorHealth {
                 working: 0.5,
                 dead,
                 excluded: false,
             };
-            step.health = vec![health(false), health(true)];
+            step.health = vec![health(false), health(true), health(false)];
+            // Its address is not known, as its frames are refused.
+            step.asked[2] = false;
             let counts = Counts {
                 taken: slot,
                 forged: 2,
                 ..Counts::default()
             };
-            metrics.take(&step, counts, &[4, 7]);
+            metrics.take(&step, counts, &[4, 7, 9]);
         }
         let text = metrics.to_string();
+        assert!(
+            text.contains("fewbits_sensor_working{sensor=\"4\"}")
+                && !text.contains("fewbits_sensor_working{sensor=\"9\"}")
+        );
         for line in [
             "fewbits_slot 3",
             "fewbits_estimate{coordinate=\"0\"} 1.5",

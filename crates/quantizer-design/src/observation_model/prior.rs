@@ -163,7 +163,7 @@ impl Prior {
     }
 
     /// The smoothed density of a sample: a normal density at every value, of Silverman's bandwidth, which decreases with the number of
-    /// values. The centres are moved towards the mean so that mean and variance are the sample's. [`Prior::sample_fit`](Self::sample_fit)
+    /// values, or of a narrower one where the values decide for it, as with several peaks. The centres are moved towards the mean so that mean and variance are the sample's. [`Prior::sample_fit`](Self::sample_fit)
     /// gives the errors.
     ///
     /// # Errors

@@ -34,7 +34,41 @@ pub(super) fn drawn_together(
     values.iter().map(move |x| mean + shrink * (x - mean))
 }
 
-/// Sorts a sample; returns its fit with Silverman's bandwidth `0.9 min(s, IQR / 1.34) n^(-1/5)`, its mean and its standard deviation.
+/// Values at which bandwidths are compared, at most.
+const COMPARED: usize = 300;
+/// A narrower bandwidth must be likelier than Silverman's by so many nats.
+const DECISIVE: f64 = 10.0;
+/// Share of a wide normal density in the comparison, so that one value far from all others does not decide it.
+const WIDE_SHARE: f64 = 0.01;
+/// Half-octaves of narrower bandwidths that are tried.
+const NARROWER: i32 = 14;
+
+/// Silverman's bandwidth `widest`, or a narrower one of half-octaves below it under which the values are decisively likelier, each under the density
+/// of the others. Silverman's rule smooths a density of several peaks far too much.
+///
+/// Equal values are left out together, so that a sample of rounded values is not taken for points.
+fn bandwidth(sorted: &[f64], mean: f64, deviation: f64, widest: f64) -> f64 {
+    let n = sorted.len();
+    let chosen: Vec<f64> = sorted.iter().copied().step_by(n.div_ceil(COMPARED)).collect();
+    let log_likelihood = |width: f64| -> f64 {
+        let log = |x: &f64| {
+            let range =
+                sorted.partition_point(|y| *y < x - 6.0 * width)..sorted.partition_point(|y| *y <= x + 6.0 * width);
+            let others = sorted[range].iter().filter(|y| *y != x);
+            let near = others.map(|y| normal::pdf((x - y) / width)).sum::<f64>() / (n as f64 * width);
+            ((1.0 - WIDE_SHARE) * near + WIDE_SHARE * normal::pdf((x - mean) / deviation) / deviation).ln()
+        };
+        chosen.iter().map(log).sum::<f64>() * (n as f64 / chosen.len() as f64)
+    };
+    let first = (widest, log_likelihood(widest));
+    let narrower = (1..=NARROWER).map(|k| widest * 0.5_f64.powf(0.5 * f64::from(k)));
+    let tried = narrower.map(|width| (width, log_likelihood(width)));
+    let best = tried.fold(first, |best, next| if next.1 > best.1 { next } else { best });
+    if best.1 > first.1 + DECISIVE { best.0 } else { widest }
+}
+
+/// Sorts a sample; returns its fit with Silverman's bandwidth `0.9 min(s, IQR / 1.34) n^(-1/5)` or a decisively likelier one, its mean and its
+/// standard deviation.
 pub(super) fn fitted(values: &mut [f64]) -> Result<(SampleFit, f64, f64), Error> {
     all_finite("values", values)?;
     let count = values.len();
@@ -54,7 +88,7 @@ pub(super) fn fitted(values: &mut [f64]) -> Result<(SampleFit, f64, f64), Error>
     let spread = (quartile(0.75) - quartile(0.25)) / 1.34;
     // If half of the values are equal, the interquartile range is zero and is not used.
     let spread = if spread > 0.0 { spread.min(deviation) } else { deviation };
-    let bandwidth = 0.9 * spread * n.powf(-0.2);
+    let bandwidth = bandwidth(values, mean, deviation, 0.9 * spread * n.powf(-0.2));
     let centres: Vec<f64> = drawn_together(values, mean, deviation, bandwidth).collect();
     let smooth = |y: f64| centres.iter().map(|c| normal::cdf((y - c) / bandwidth)).sum::<f64>() / n;
     // 200 points find the largest difference with an error well below the sampling error.
@@ -73,4 +107,33 @@ pub(super) fn fitted(values: &mut [f64]) -> Result<(SampleFit, f64, f64), Error>
         deviation_standard_error: deviation * ((kurtosis - 1.0).max(0.0) / (4.0 * n)).sqrt(),
     };
     Ok((fit, mean, deviation))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fitted;
+    use fewbits_numerics::normal::quantile;
+
+    /// Defect: two peaks at -3 and 3 of deviation .3 were smoothed by .8 deviations of all values; a design stated 6.6 times the error that it has.
+    #[test]
+    fn peaks_are_not_smoothed_away() {
+        let normal = |i: usize| quantile((f64::from(i as u32) + 0.5) / 250.0);
+        let mut peaks: Vec<f64> = (0..500)
+            .map(|i| 0.3 * normal(i / 2) + if i % 2 == 0 { -3.0 } else { 3.0 })
+            .collect();
+        let (fit, ..) = fitted(&mut peaks).unwrap();
+        assert!(fit.bandwidth < 0.15 && fit.smoothing_error < 0.02, "{fit:?}");
+        // One peak keeps Silverman's rule, rounded or not, and with a value far away.
+        let silverman = |values: &[f64]| {
+            let (mut values, n) = (values.to_vec(), values.len() as f64);
+            let (fit, _, deviation) = fitted(&mut values).unwrap();
+            let quartile = |share: f64| values[((n - 1.0) * share).round() as usize];
+            let spread = ((quartile(0.75) - quartile(0.25)) / 1.34).min(deviation);
+            assert_eq!(fit.bandwidth, 0.9 * spread * n.powf(-0.2));
+        };
+        let one: Vec<f64> = (0..250).map(normal).collect();
+        silverman(&one);
+        silverman(&one.iter().map(|x| (5.0 * x).round() / 5.0).collect::<Vec<f64>>());
+        silverman(&[one.as_slice(), &[40.0]].concat());
+    }
 }

@@ -182,6 +182,49 @@ impl Levels {
         }
     }
 
+    /// As [`partition`](Self::partition) on a circle: `edges` within one period, and a probability for the cell after each edge; the last cell
+    /// goes on to the first edge. Exact for a measurement within a period of the middle of the edges, which [`crate::circle`] sees to.
+    ///
+    /// A bit that says on which side of a prediction of 350 degrees a compass points, by the shorter way:
+    ///
+    /// ```
+    /// use fewbits_core::factor::Levels;
+    /// let left = Levels::around(360.0, &[170.0, 350.0], &[1.0, 0.0], 25.0)?;
+    /// assert!(left.log_probability(340.0) > -0.1 && left.log_probability(10.0) < -5.0);
+    /// assert!((left.log_probability(350.0).exp() - 0.5).abs() < 1e-9);
+    /// assert!((left.log_probability(170.0).exp() - 0.5).abs() < 1e-9); // the far side
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As there; if the period is not positive and finite, or the edges span a period or more.
+    pub fn around(
+        period: f64,
+        edges: &[f64],
+        given_cell: &[f64],
+        noise: impl Into<Noise>,
+    ) -> Result<Self, ArgumentError> {
+        fewbits_numerics::error::positive("period", period)?;
+        let (Some(first), Some(last)) = (edges.first(), edges.last()) else {
+            return Err(ArgumentError::new("edges", "none", "at least one edge"));
+        };
+        if last - first >= period {
+            let text = format!("{first} to {last}");
+            return Err(ArgumentError::new("edges", text, format!("edges within a period of {period}")));
+        }
+        if given_cell.len() != edges.len() {
+            let text = format!("{} probabilities", given_cell.len());
+            return Err(ArgumentError::new("given_cell", text, format!("{}, one per edge", edges.len())));
+        }
+        let turns = [-1.0, 0.0, 1.0];
+        let all: Vec<f64> = turns
+            .iter()
+            .flat_map(|turn| edges.iter().map(move |e| e + turn * period))
+            .collect();
+        let before = &given_cell[given_cell.len() - 1..];
+        Self::partition(&all, &[before, &given_cell.repeat(turns.len())].concat(), noise)
+    }
+
     /// An observation of the same probability under every measurement. Zero makes it impossible.
     ///
     /// # Errors

@@ -1,5 +1,6 @@
 //! Sweeps of [`Levels`] over many noise-free measurements, in vector registers.
 
+use super::super::scalar::middle;
 use super::{Cells, Levels};
 use crate::cell::Cell;
 use crate::columns::{Columns, lengths_agree};
@@ -192,6 +193,10 @@ impl Factor<1> for Levels {
                 pairs.for_each(|(log_weight, m)| *log_weight += self.log_probability(*m));
             }
         }
+    }
+
+    fn location(&self) -> Option<SVector<f64, 1>> {
+        middle(self.features().into_iter())
     }
 
     fn as_scalar(&self) -> Option<Scalar> {

@@ -1,0 +1,236 @@
+//! A leak in rooms, from readings of a few bits at irregular times. The truth has cells of half the width, another diffusivity and other gains.
+
+use fewbits_diffusion::{Flow, LeakBelief, LeakPrior, Plan, Reading, Scheme, SensorField, StepControl, Transport};
+use fewbits_numerics::normal::quantile;
+
+const PLAN: &str = "
+    ##############
+    #kkkk#bbbb#ll#
+    #kkkk#bbbb#ll#
+    #kkkk.bbbb#ll#
+    ###.####.##ll#
+    #hhhhhhhhh.llO
+    ###.#######ll#
+    #ssssss#ll.ll#
+    #ssssss#ll#ll#
+    ##############
+    k = kitchen
+    b = bath
+    h = hall
+    s = study
+    l = living room";
+const SENSORS: [[f64; 3]; 5] = [
+    [1.2, 0.7, 0.0],
+    [3.7, 0.7, 0.0],
+    [2.7, 2.7, 0.0],
+    [2.2, 4.2, 0.0],
+    [5.7, 3.2, 0.0],
+];
+const AGES: [f64; 9] = [20.0, 50.0, 100.0, 200.0, 400.0, 700.0, 1200.0, 2000.0, 4000.0];
+const NOISE: f64 = 4e-6;
+
+struct Draws(u64);
+
+impl Draws {
+    /// Uniform in (0, 1).
+    fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        quantile(self.next())
+    }
+}
+
+fn field(split: usize, diffusivity: f64) -> (SensorField, Transport) {
+    let domain = Plan::parse(PLAN).unwrap().domain(0.5, split, 0.0).unwrap();
+    let still = Flow::still(&domain);
+    let transport = Transport::new(domain, diffusivity, &still, 1e-3, Scheme::default()).unwrap();
+    (
+        SensorField::transient(&transport, &SENSORS, &AGES, StepControl::Tolerance(1e-3)).unwrap(),
+        transport,
+    )
+}
+
+/// Concentration at a sensor of a unit leak in a cell after a time.
+fn response(field: &SensorField, sensor: usize, cell: usize, age: f64) -> f64 {
+    let ages = [&[0.0], AGES.as_slice()].concat();
+    let at = |i: usize| {
+        if i == 0 {
+            0.0
+        } else {
+            field.response(sensor, i - 1).unwrap()[cell]
+        }
+    };
+    match ages.iter().position(|known| *known >= age) {
+        _ if age <= 0.0 => 0.0,
+        None => at(ages.len() - 1),
+        Some(i) => {
+            let share = (age - ages[i - 1]) / (ages[i] - ages[i - 1]);
+            share * at(i) + (1.0 - share) * at(i - 1)
+        }
+    }
+}
+
+/// Worlds in which the leak's room is named, in which the area of 90 % holds it, whose misfit is below .001, and the mean number of cells in the area.
+fn run(worlds: usize, bits: u32, readings: usize, gain_error: f64) -> [f64; 4] {
+    let (coarse, _) = field(1, 0.02);
+    let plan = Plan::parse(PLAN).unwrap();
+    let fine = [field(2, 0.02), field(2, 0.02 * 1.1)];
+    let prior = LeakPrior {
+        start: [0.0, 600.0],
+        rate: [1e-7, 3e-6],
+        model_error: 0.1,
+        faults: 0.001,
+    };
+    let edges = if bits == 1 { vec![2e-5] } else { vec![1e-5, 3e-5, 9e-5] };
+    let (mut found, mut draws) = ([0.0; 4], Draws(7));
+    for world in 0..worlds {
+        let (truth, transport) = &fine[world % 2];
+        let fine_domain = transport.domain();
+        let leak = (draws.next() * fine_domain.free().len() as f64) as usize;
+        let (start, rate) = (600.0 * draws.next(), 1e-7 * 30.0_f64.powf(draws.next()));
+        let gains: Vec<f64> = SENSORS.iter().map(|_| 1.0 + gain_error * draws.normal()).collect();
+        let mut belief = LeakBelief::new(coarse.clone(), &prior).unwrap();
+        for _ in 0..readings {
+            let (sensor, time) = ((draws.next() * 5.0) as usize, 2000.0 * draws.next());
+            let z = gains[sensor] * rate * response(truth, sensor, leak, time - start) + NOISE * draws.normal();
+            let reading = if bits == 0 {
+                Reading::Value(z)
+            } else {
+                Reading::Word {
+                    edges: edges.clone(),
+                    word: edges.iter().filter(|edge| z >= **edge).count(),
+                }
+            };
+            belief.observe(sensor, time, &reading, NOISE).unwrap();
+        }
+        let place = fine_domain.grid().centre(fine_domain.free()[leak]);
+        let (coarse_domain, _) = (plan.domain(0.5, 1, 0.0).unwrap(), ());
+        let own = coarse_domain.locate(place).unwrap();
+        let area = belief.area(0.9).unwrap();
+        let room = plan.rooms_of(&coarse_domain).unwrap()[own].map_or("elsewhere", |room| plan.rooms()[room]);
+        found[0] += f64::from(belief.rooms(&plan).unwrap()[0].0 == room);
+        found[1] += f64::from(area.contains(&own));
+        found[2] += f64::from(belief.misfit() < 1e-3);
+        found[3] += area.len() as f64 / worlds as f64;
+    }
+    found
+}
+
+/// `FEWBITS_RUNS=200 cargo test -p fewbits-diffusion areas_of -- --nocapture` prints the shares.
+#[test]
+fn areas_of_90_percent_hold_the_leak() {
+    let runs = std::env::var("FEWBITS_RUNS").ok().and_then(|runs| runs.parse().ok());
+    let worlds = runs.unwrap_or(5);
+    for bits in [0, 1, 2].into_iter().take(if runs.is_some() { 3 } else { 2 }) {
+        let found = run(worlds, bits, 40, 0.1);
+        println!("{bits} bits: room, area, misfit, cells of {worlds}: {found:?}");
+        assert!(found[1] >= 0.8 * worlds as f64 - 1.0 && found[0] >= 0.8 * worlds as f64 - 1.0, "{bits}: {found:?}");
+    }
+}
+
+/// Readings whose sensors are confused fit no leak.
+#[test]
+fn confused_sensors_are_a_misfit() {
+    let (coarse, transport) = field(1, 0.02);
+    let prior = LeakPrior {
+        start: [0.0, 600.0],
+        rate: [1e-7, 3e-6],
+        model_error: 0.1,
+        faults: 0.001,
+    };
+    let leak = transport.domain().locate([1.2, 0.7, 0.0]).unwrap();
+    let misfits = [0, 2].map(|shift| {
+        let (mut belief, mut draws) = (LeakBelief::new(coarse.clone(), &prior).unwrap(), Draws(3));
+        for k in 0..30 {
+            let (sensor, time) = (k % 5, 2000.0 * draws.next());
+            let z = 1e-6 * response(&coarse, sensor, leak, time - 300.0) + NOISE * draws.normal();
+            let word = usize::from(z >= 2e-5);
+            belief
+                .observe(
+                    (sensor + shift * (k / 5 % 2)) % 5,
+                    time,
+                    &Reading::Word {
+                        edges: vec![2e-5],
+                        word,
+                    },
+                    NOISE,
+                )
+                .unwrap();
+        }
+        belief.misfit()
+    });
+    assert!(misfits[0] > 0.01 && misfits[1] < 1e-3, "{misfits:?}");
+}
+
+#[test]
+fn rooms_have_the_names_of_the_plan() {
+    let plan = Plan::parse("#####\n#a.b#\n#####\n b = dining room\na = hall").unwrap();
+    assert_eq!(plan.rooms(), ["hall", "dining room"]);
+    assert_eq!(plan.rooms_of(&plan.domain(1.0, 1, 0.0).unwrap()).unwrap(), [Some(0), None, Some(1)]);
+    assert!(
+        Plan::parse("#a#\nc = hall").is_err()
+            && Plan::parse("#a#\na = x\na = y").is_err()
+            && Plan::parse("#a#\na =").is_err()
+    );
+    let other = Plan::parse("....\n....").unwrap().domain(1.0, 1, 0.0).unwrap();
+    assert!(plan.rooms_of(&other).is_err());
+}
+
+#[test]
+fn bad_readings_and_priors_are_refused() {
+    let prior = LeakPrior {
+        start: [0.0, 600.0],
+        rate: [1e-7, 3e-6],
+        model_error: 0.1,
+        faults: 0.001,
+    };
+    let (field, _) = field(1, 0.02);
+    let with = |prior: LeakPrior| LeakBelief::new(field.clone(), &prior);
+    assert!(
+        with(LeakPrior {
+            rate: [1e-6, 1e-6],
+            ..prior.clone()
+        })
+        .is_err()
+    );
+    assert!(
+        with(LeakPrior {
+            start: [1.0, 0.0],
+            ..prior.clone()
+        })
+        .is_err()
+    );
+    assert!(
+        with(LeakPrior {
+            faults: 1.0,
+            ..prior.clone()
+        })
+        .is_err()
+    );
+    assert!(
+        with(LeakPrior {
+            model_error: f64::NAN,
+            ..prior.clone()
+        })
+        .is_err()
+    );
+    let mut belief = with(prior).unwrap();
+    let word = |edges: &[f64], word| Reading::Word {
+        edges: edges.to_vec(),
+        word,
+    };
+    assert!(belief.observe(5, 0.0, &Reading::Value(0.0), NOISE).is_err());
+    assert!(belief.observe(0, f64::NAN, &Reading::Value(0.0), NOISE).is_err());
+    assert!(belief.observe(0, 0.0, &Reading::Value(0.0), 0.0).is_err());
+    assert!(belief.observe(0, 0.0, &word(&[1e-5], 2), NOISE).is_err());
+    assert!(belief.observe(0, 0.0, &word(&[1e-5, 1e-5], 0), NOISE).is_err());
+    assert!(belief.observe(0, 0.0, &word(&[], 0), NOISE).is_err());
+    let total: f64 = belief.cells().iter().sum();
+    assert!((total - 1.0).abs() < 1e-12 && belief.misfit() == 1.0);
+}
