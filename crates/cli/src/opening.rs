@@ -4,10 +4,13 @@ use crate::arguments::TableOptions;
 use crate::clock;
 use crate::error::Error;
 use crate::files::is_regular;
+use crate::say::say;
 use fewbits_table::names;
 use indicatif::{ProgressBar, ProgressStyle};
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{IsTerminal, Read, Seek};
+use std::sync::{Mutex, PoisonError};
 
 /// The first bytes of a Parquet file, and of a recording.
 const PARQUET: [u8; 4] = *b"PAR1";
@@ -117,7 +120,11 @@ fn chosen_at_once(options: &TableOptions) -> Result<fewbits_table::Table, Error>
         (None, time) if !stored.is_empty() && (time.is_some() || options.by.is_some()) => {
             table.set_time(&stored).map_err(&failed)?;
         }
-        (None, Some(_)) => table.require_time().map_err(&failed)?,
+        (None, Some(_)) if table.find_time().map_err(&failed)? => {}
+        (None, Some(_)) => {
+            table.require_time().map_err(&failed)?;
+            tell_first(&table, file);
+        }
         (None, None) if options.by.is_some() => drop(table.find_time().map_err(&failed)?),
         (None, None) => {}
     }
@@ -129,6 +136,20 @@ fn chosen_at_once(options: &TableOptions) -> Result<fewbits_table::Table, Error>
     }
     select(&mut table, &options.columns, &options.without()).map_err(&failed)?;
     Ok(table)
+}
+
+/// Says once of a file that its first column is taken for the time though nothing but its numbers says so.
+fn tell_first(table: &fewbits_table::Table, file: &str) {
+    static TOLD: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    let mut told = TOLD.lock().unwrap_or_else(PoisonError::into_inner);
+    if told.insert(file.to_owned())
+        && let Some(first) = table.columns().first()
+    {
+        let name = crate::say::name(&first.name).into_owned();
+        say!(
+            "note: {file}: the first column, `{name}`, is taken for the time, as its numbers increase: --time-column names another"
+        );
+    }
 }
 
 fn select(

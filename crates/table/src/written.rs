@@ -302,7 +302,12 @@ impl Clock {
             (_, Some(stamp)) => {
                 return Ok(Time::checked(stamp.as_second(), i128::from(stamp.subsec_nanosecond()) * 1_000_000_000));
             }
-            _ => return Err(refused),
+            // A month, or a year, is its first day.
+            _ if parsed.day().is_some() || parsed.day_of_year().is_some() => return Err(refused),
+            _ => parsed
+                .year()
+                .and_then(|year| Date::new(year, parsed.month().unwrap_or(1), 1).ok())
+                .ok_or(refused)?,
         };
         match parsed.offset() {
             Some(offset) => Ok(Time::checked(civil_seconds(date, second) - i64::from(offset.seconds()), fraction)),

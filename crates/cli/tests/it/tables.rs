@@ -369,3 +369,18 @@ fn look_names_columns_of_text_that_are_no_words() {
     let shown = text(&good(folder.path(), &["look", "s.csv"], b""));
     assert!(shown.contains("too long for a recording, say --without note"), "{shown}");
 }
+
+/// Nothing but its numbers says that the first column is the time.
+#[test]
+fn first_column_taken_for_the_time_is_told() {
+    for (name, is_told) in [("step", true), ("time", false)] {
+        let kept = folder(&[("t.csv", &format!("{name},x\n1,5\n2,6\n4,7\n"))]);
+        let output = fewbits(kept.path(), &["pack", "t.csv", "--time", "exact", "-o", "t.fewb"], b"");
+        let said = text(&output.stderr);
+        assert_eq!(
+            said.matches("the first column, `step`, is taken for the time").count(),
+            usize::from(is_told),
+            "{said}"
+        );
+    }
+}

@@ -221,6 +221,20 @@ fn digits_without_marks_are_no_counts() {
     mend(&of("month", &|i| 202_001 + i / 12 * 100 + i % 12), "--time-format %Y%m");
     mend(&of("year", &|i| 1990 + i), "--time-format %Y");
     mend(&timed("Time (min.sec)", 2, |i| i / 100.0), "--time-format %M.%S");
+    // What the refusals say is read.
+    for (format, first, second, name) in [
+        ("%Y", "1990", "1991", "1991-01-01"),
+        ("%Y%m", "202001", "202002", "2020-02-01"),
+    ] {
+        let said = Dialect {
+            time_format: Some(format.to_owned()),
+            ..Dialect::default()
+        };
+        let mut table = open_said(&format!("year,x\n{first},1\n{second},2\n"), &said).unwrap();
+        table.require_time().unwrap();
+        let (_, scale) = table.time().unwrap();
+        assert_eq!(rows(&mut table).times[1].shown(scale, 0), format!("{name}T00:00:00"));
+    }
     // Counts with the same digits.
     for step in [1, 7, 40, 100] {
         let found = seconds(&rows(&mut open(&of("time", &|i| step * i))));
