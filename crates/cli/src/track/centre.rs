@@ -59,6 +59,8 @@ pub(super) trait Estimator {
     fn health(&self, sensor: usize) -> (f64, bool);
     /// Number of its reports that were rejected.
     fn rejected(&self, sensor: usize) -> u64;
+    /// Of a sensor that sends bits: by how many deviations unlikely ones came more often than predicted.
+    fn surprise(&self, sensor: usize) -> Option<f64>;
     /// The estimates of all steps given all reports, or those up to so many seconds later.
     fn smoothed(&self, lag: Option<f64>) -> Result<Vec<Vec<(f64, f64)>>, Failure>;
 }
@@ -88,7 +90,7 @@ pub(super) fn centre(world: &World, purpose: Use) -> Result<Box<dyn Estimator>, 
         // Ranges have their own tracker.
         Model::Returning | Model::Walk | Model::Ranges => {
             let model = world.walk(world.change)?;
-            if world.is_cut {
+            if world.is_on_grid {
                 Box::new(Centre::<1, _>::new(model, PointMassFilter::following(), world, purpose)?)
             } else {
                 Box::new(Centre::<1, _>::new(model, MomentFilter, world, purpose)?)
@@ -131,7 +133,7 @@ struct Centre<const D: usize, F: StateFilter<D>> {
     members: Vec<Member>,
     purpose: Use,
     period: Option<f64>,
-    is_cut: bool,
+    is_on_change: bool,
     zero: f64,
     rng: Pcg64Mcg,
     world: ContinuousLinear<D>,
@@ -181,7 +183,7 @@ impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
             members: Vec::new(),
             purpose,
             period: world.period,
-            is_cut: world.is_cut,
+            is_on_change: world.is_on_change,
             zero: world.zero,
             rng,
             world: model,
@@ -287,8 +289,9 @@ impl<const D: usize, F: StateFilter<D>> Estimator for Centre<D, F> {
         let events = received.events.into_iter();
         let events = events.map(|event| (event.name(), event.sensor().map(|sensor| sensor as usize)));
         // Alarms are about values that come whatever they are, not about those that were sent because they are far from the last.
-        let is_meant =
-            |event: &(&'static str, Option<usize>)| !self.is_cut || !matches!(event.0, "lost" | "noise overstated");
+        let is_meant = |event: &(&'static str, Option<usize>)| {
+            !self.is_on_change || !matches!(event.0, "lost" | "noise overstated")
+        };
         let events: Vec<_> = events.filter(is_meant).collect();
         let rejected = events.iter().filter(|(event, _)| *event == "rejected").count();
         let belief = self.centre.estimate();
@@ -321,6 +324,10 @@ impl<const D: usize, F: StateFilter<D>> Estimator for Centre<D, F> {
 
     fn rejected(&self, sensor: usize) -> u64 {
         self.centre.sensor(sensor as u32).map_or(0, |state| state.rejected)
+    }
+
+    fn surprise(&self, sensor: usize) -> Option<f64> {
+        self.centre.sensor(sensor as u32).ok()?.surprise
     }
 
     fn smoothed(&self, lag: Option<f64>) -> Result<Vec<Vec<(f64, f64)>>, Failure> {

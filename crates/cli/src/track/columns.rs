@@ -14,9 +14,10 @@ const LABELS: [&str; 16] = [
 /// From this one on, numbers are names too, where places are looked for.
 const PLACED: usize = 12;
 /// Names of a column of the standard deviations of each row's values.
-const ACCURACIES: [&str; 8] = [
+const ACCURACIES: [&str; 9] = [
     "accuracy",
     "hacc",
+    "stderr",
     "sigma",
     "std",
     "stddev",
@@ -24,7 +25,8 @@ const ACCURACIES: [&str; 8] = [
     "sd",
     "uncertainty",
 ];
-
+/// The same beside one column of values; of several sensors they may be something else.
+const ERRORS: [&str; 3] = ["error", "err", "precision"];
 /// Names of columns that say how good a fix is, or whose it is: no sensor measures them.
 const NO_LEVELS: [&str; 10] = [
     "hdop",
@@ -134,12 +136,14 @@ impl Roles {
         };
         let free: Vec<usize> = (0..table.names.len()).filter(is_free).collect();
         if is_whole && kind.finds == Finds::Levels && found.accuracy.is_none() {
+            let is_beside_one = free.iter().filter(|i| !holds_words(table, **i)).count() == 2;
+            let is_said_by = |word: &str| ACCURACIES.contains(&word) || (is_beside_one && ERRORS.contains(&word));
             let is_accuracy = |i: &&usize| {
                 let words = words(&table.names[**i]);
                 !holds_words(table, **i)
                     && [words.first(), words.last()]
                         .iter()
-                        .any(|word| word.is_some_and(|word| ACCURACIES.contains(&word.as_str())))
+                        .any(|word| word.is_some_and(|word| is_said_by(word)))
             };
             let those: Vec<&String> = free.iter().filter(is_accuracy).map(|i| &table.names[*i]).collect();
             match those.as_slice() {

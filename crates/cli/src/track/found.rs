@@ -8,7 +8,7 @@ use super::world::World;
 use crate::arguments::Model;
 use crate::error::Error;
 use crate::report::Report;
-use fewbits_filters::calibration::{self, Number, median, wrapped};
+use fewbits_filters::calibration::{self, Calibration, Number, median, wrapped};
 use fewbits_filters::fit::{LevelModel, SensorModel, SensorTest};
 use fewbits_recipes::rounding;
 
@@ -25,6 +25,23 @@ const LEAST_OWN: f64 = 0.05;
 const REPEATING: f64 = 3.3;
 /// A model with a slope is suggested if it explains the first rows better by so many nats.
 const SLOPING: f64 = 20.0;
+
+/// The first rows may be less likely by so many nats, and one more for each number, under what more rows say: as far as chance goes once in a
+/// thousand tables.
+const LOSS_ALONE: f64 = 5.0;
+
+/// Share of values beyond a limit up to which the mean and the deviation of all say those of the level.
+const MOST_CUT: f64 = 0.05;
+
+/// Least guess of the change, as a share of the noise.
+const LEAST_GUESS: f64 = 0.01;
+
+fn refused(source: fewbits_filters::Error) -> Error {
+    Error::Refused {
+        what: "change and noise cannot be found",
+        source: source.into(),
+    }
+}
 
 /// What is found from the first rows, and the deviation of rounding, which a noise is not below.
 pub(super) struct Unknown {
@@ -52,6 +69,20 @@ impl Settings {
                 option: "--prior",
                 reason: "the first rows hold no numbers",
             });
+        }
+        if self.world.model == Model::Returning && self.world.prior.1 == 0.0 {
+            let readings = self.readings(first, names);
+            let all = readings.iter().flat_map(|instant| &instant.values);
+            let is_cut = |reading: &calibration::Reading| matches!(reading, calibration::Reading::Within { lower, upper } if (upper - lower).is_infinite());
+            let (count, cut) = all.fold((0.0, 0.0), |(count, cut), (_, reading)| {
+                (count + 1.0, cut + f64::from(u8::from(is_cut(reading))))
+            });
+            if cut > MOST_CUT * count {
+                return Err(Error::Needed {
+                    option: "--prior",
+                    reason: "values beyond a limit do not tell the mean and the deviation of a level that returns",
+                });
+            }
         }
         // A wild value moves neither middle nor spread. If most values are equal, the spread is that of all.
         let period = self.world.period;
@@ -129,7 +160,7 @@ impl Settings {
     }
 
     /// The first rows with what their cells mean.
-    fn readings(&self, first: &[Instant], names: &[String]) -> Vec<calibration::Instant> {
+    pub(super) fn readings(&self, first: &[Instant], names: &[String]) -> Vec<calibration::Instant> {
         let seats: Vec<Seat> = (0..names.len())
             .map(|sensor| self.seat_with(sensor, Report::Value, self.noise, None))
             .collect();
@@ -170,40 +201,43 @@ impl Settings {
             .collect()
     }
 
-    /// Finds change and noises as far as no option states them.
-    pub(super) fn calibrate(&mut self, first: &[Instant], names: &[String], unknown: &Unknown) -> Result<(), Error> {
+    /// Change and noises as far as they are to be found; the others, and all without `unknown`, are known.
+    fn numbers(&self, names: &[String], unknown: Option<&Unknown>) -> (Number, Vec<Number>) {
+        let floor = unknown.map_or(0.0, |unknown| unknown.floor);
         let noise = |(sensor, name): (usize, &String)| {
             let step = self.step_of(sensor);
             // Where rounding is not a cell, it is part of the noise.
-            let with = |own: f64| if step.is_some() { own } else { own.hypot(unknown.floor) };
+            let with = |own: f64| if step.is_some() { own } else { own.hypot(floor) };
             match self.noises.of(name) {
                 Some(stated) => Number::Known(with(*stated)),
-                None if unknown.noise => Number::Unknown {
+                None if unknown.is_some_and(|unknown| unknown.noise) => Number::Unknown {
                     guess: self.found.get(sensor).copied().unwrap_or(self.noise),
-                    least: step.map_or(unknown.floor, |step| LEAST_OWN * step),
+                    least: step.map_or(floor, |step| LEAST_OWN * step),
                 },
-                None => Number::Known(with(self.noise)),
+                // What was found has its share of rounding.
+                None => Number::Known(self.found.get(sensor).copied().unwrap_or(with(self.noise))),
             }
         };
-        let noises: Vec<Number> = names.iter().enumerate().map(noise).collect();
-        let change = match unknown.change {
+        let change = match unknown.is_some_and(|unknown| unknown.change) {
             true => Number::Unknown {
                 guess: self.world.change,
                 least: 0.0,
             },
             false => Number::Known(self.world.change),
         };
+        (change, names.iter().enumerate().map(noise).collect())
+    }
+
+    /// Finds change and noises as far as no option states them.
+    pub(super) fn calibrate(&mut self, first: &[Instant], names: &[String], unknown: &Unknown) -> Result<(), Error> {
+        let (change, noises) = self.numbers(names, Some(unknown));
         let readings = self.readings(first, names);
-        let refused = |source: fewbits_filters::Error| Error::Refused {
-            what: "change and noise cannot be found",
-            source: source.into(),
-        };
         let mut found = self
             .world
             .calibrate(&readings, change, self.world.change, &noises)
             .map_err(refused)?;
         // Silence cuts the belief: that of a walk is followed exactly, and that of a slope is not.
-        if unknown.change && self.world.model == Model::Walk && !self.world.is_cut {
+        if unknown.change && self.world.model == Model::Walk && !self.world.is_on_grid {
             // The same with a slope, which is only compared.
             let sloping = World {
                 model: Model::Velocity,
@@ -220,10 +254,50 @@ impl Settings {
                 }
             }
         }
+        self.take(found, unknown);
+        Ok(())
+    }
+
+    fn take(&mut self, found: Calibration, unknown: &Unknown) {
         self.world.change = found.change;
         if unknown.noise {
             self.noise = median(found.noises.clone());
             self.found = found.noises;
+        }
+    }
+
+    /// Finds change and noises again from `more` rows, the first ones among them. What is found is taken if it explains the first rows nearly as
+    /// well as what was found from them alone: a sensor that fails later must not change the noise that it has before.
+    pub(super) fn refine(
+        &mut self,
+        (first, more): (&[Instant], &[Instant]),
+        names: &[String],
+        unknown: &Unknown,
+    ) -> Result<(), Error> {
+        let readings = self.readings(first, names);
+        let explained = |settings: &Self| {
+            let (change, noises) = settings.numbers(names, None);
+            let found = settings
+                .world
+                .calibrate(&readings, change, settings.world.change, &noises);
+            found.map(|found| found.log_likelihood).map_err(refused)
+        };
+        let before = (self.world.change, self.noise, self.found.clone());
+        let likelihood = explained(self)?;
+        if unknown.change {
+            // First rows without a change are no guess of that of the others.
+            self.world.change = self.world.change.max(LEAST_GUESS * self.noise);
+        }
+        let (change, noises) = self.numbers(names, Some(unknown));
+        let found = self
+            .world
+            .calibrate(&self.readings(more, names), change, self.world.change, &noises)
+            .map_err(refused)?;
+        self.take(found, unknown);
+        let numbers = noises.iter().chain([&change]);
+        let free = numbers.filter(|one| matches!(one, Number::Unknown { .. })).count();
+        if explained(self)? < likelihood - (LOSS_ALONE + free as f64) {
+            (self.world.change, self.noise, self.found) = before;
         }
         Ok(())
     }

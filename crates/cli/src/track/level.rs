@@ -114,6 +114,7 @@ impl Run {
                 reports: 0,
                 gaps: 0,
                 rejected: 0,
+                surprise: None,
                 noise: seat.noise,
                 offset: seat.offset,
                 working: 1.0,
@@ -165,6 +166,7 @@ impl Run {
         for (number, sensor) in self.summary.sensors.iter_mut().enumerate() {
             (sensor.working, sensor.used) = self.centre.health(number);
             sensor.rejected = self.centre.rejected(number);
+            sensor.surprise = self.centre.surprise(number);
         }
         let points = self.path.points();
         let edge = |sign: f64| {
@@ -303,6 +305,7 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
         let hint = "no column has times: rows count as a second apart; if one has, name it with --time-column";
         run.summary.hints.push(hint.to_owned());
     }
+    run.summary.hints.extend(instants.strange_accuracies());
     run.summary.hints.extend(turning.hints(&instants.names));
     let lines_of = |stuck: &Stuck| stuck.hints(&instants.names);
     run.summary.hints.extend(stuck.iter().flat_map(lines_of));

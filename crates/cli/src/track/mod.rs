@@ -10,6 +10,7 @@
 //! | `first` | values of the first rows |
 //! | `found` | what is found from the first rows |
 //! | `hints` | what the first rows suggest that no option says |
+//! | `doubts` | what the values say against the stated noise |
 //! | `stuck` | sensors that repeat one value |
 //! | `limits` | detection limits |
 //! | `late` | rows that come late |
@@ -27,6 +28,7 @@ mod applied;
 mod centre;
 mod columns;
 mod divisor;
+mod doubts;
 mod first;
 mod fit;
 mod found;

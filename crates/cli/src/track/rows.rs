@@ -41,6 +41,8 @@ pub(super) struct Instants {
     pub(super) names: Vec<String>,
     /// Number of rows that were dropped because they repeat one of the same time.
     pub(super) copies: u64,
+    /// Number of rows whose accuracy is 0 or below, and of those whose accuracy is infinite.
+    strange: [u64; 2],
     /// What is corrected in the values of a sensor.
     corrections: Vec<Correction>,
     /// Time and cells of the last row.
@@ -129,6 +131,7 @@ impl Instants {
             last: 0.0,
             next_number: 0,
             copies: 0,
+            strange: [0; 2],
             corrections: Vec::new(),
             before: None,
             ahead: VecDeque::new(),
@@ -152,6 +155,23 @@ impl Instants {
     /// Whether rows may come one by one: [`Table::is_live`].
     pub(super) fn is_live(&self) -> bool {
         self.table.is_live()
+    }
+
+    /// What was made of accuracies that are none, a line each.
+    pub(super) fn strange_accuracies(&self) -> Vec<String> {
+        let name = self.roles.accuracy.as_deref().unwrap_or_default();
+        let [unknown, void] = self.strange;
+        let mut lines = Vec::new();
+        if unknown > 0 {
+            lines.push(format!(
+                "{name} is 0 or below in {unknown} rows: their values have the noise of the sensor; if it marks values that are void, leave those \
+                 rows out"
+            ));
+        }
+        if void > 0 {
+            lines.push(format!("{name} is infinite in {void} rows, whose values are left out"));
+        }
+        lines
     }
 
     /// Whether rows have times.
@@ -330,11 +350,15 @@ impl Instants {
             return Err(Error::content(self.file(), problem));
         }
         self.last = seconds;
-        let own = self
-            .own
-            .map(|place| cells.get(place?).copied().flatten().filter(|cell| cell.is_finite()));
+        let own = self.own.map(|place| cells.get(place?).copied().flatten());
+        let [accuracy, threshold] = own;
+        // What an infinite accuracy says is nothing. Zero and below are marks of devices that do not know theirs.
+        let is_void = accuracy == Some(f64::INFINITY);
+        if let Some(accuracy) = accuracy.filter(|accuracy| *accuracy <= 0.0 || !accuracy.is_finite()) {
+            self.strange[usize::from(accuracy > 0.0)] += 1;
+        }
         let places: Vec<usize> = (0..cells.len()).filter(|i| !self.own.contains(&Some(*i))).collect();
-        let cells = places.iter().map(|i| (*i, cells[*i]));
+        let cells = places.iter().map(|i| (*i, cells[*i].filter(|_| !is_void)));
         let mut reports: Reports = if self.is_long {
             let label = self.table.label();
             let known = self.names.iter().position(|name| name == label);
@@ -356,8 +380,8 @@ impl Instants {
             }
         }
         let qualifier = |place: &usize| Qualifier {
-            accuracy: own[0],
-            threshold: own[1],
+            accuracy: accuracy.filter(|accuracy| accuracy.is_finite()),
+            threshold: threshold.filter(|threshold| threshold.is_finite()),
             limit: self.table.limit(*place).filter(|_| self.has_limits),
         };
         Ok(Some(Instant {

@@ -28,6 +28,9 @@ const FEWEST_VALUES: usize = 30;
 /// Smallest and largest assumed share of lost reports.
 const LOSS: (f64, f64) = (0.02, 0.5);
 
+/// A value that is rounded is a cell, and no number with more noise, if its step is more than so many deviations of the noise.
+const WIDE_CELL: f64 = 2.0;
+
 const NO_VALUES: &str = "it cannot be found from reports of few bits";
 
 /// All settings of a centre for a level.
@@ -223,7 +226,8 @@ impl Settings {
                 steepest: 0.0,
                 is_smoothed: options.smooth.is_some(),
                 // Of single reports nothing tells the noise, and a wrong one misleads an exact filter more.
-                is_cut: within.is_some() && (asked_noise.is_some() || options.table.by.is_none()),
+                is_on_grid: within.is_some() && (asked_noise.is_some() || options.table.by.is_none()),
+                is_on_change: within.is_some(),
                 zero: 0.0,
                 is_learning: options
                     .learning
@@ -275,14 +279,28 @@ impl Settings {
         if asked_step.is_none() && options.rounded.as_deref() != Some("no") {
             settings.find_steps(&first, &instants.names);
         }
+        let is_rounded = settings.steps.iter().any(Option::is_some);
+        let is_cut = settings.is_cut(options, &instants.names);
         // Rounded values are cells, of which change and noise are found anew.
-        if let Some(unknown) = unknown.filter(|unknown| unknown.change || unknown.noise)
-            && settings.steps.iter().any(Option::is_some)
+        if let Some(unknown) = unknown.as_ref().filter(|unknown| unknown.change || unknown.noise)
+            && is_rounded
         {
-            settings.calibrate(&first, &instants.names, &unknown)?;
+            settings.calibrate(&first, &instants.names, unknown)?;
+        }
+        settings.world.is_on_grid |= is_cut;
+        // From a file that is there as a whole, more rows can be read. The likelihood on a grid would take too long.
+        if let Some(unknown) = unknown.filter(|unknown| unknown.change || unknown.noise)
+            && !settings.world.is_on_change
+            && !instants.is_live()
+        {
+            let more: Vec<Instant> = instants.peek(MOST_FIRST)?.iter().cloned().collect();
+            if more.len() > first.len() {
+                settings.refine((&first, &more), &instants.names, &unknown)?;
+            }
         }
         // Cells have no residual that would tell whether the change is right.
-        let has_cells = settings.meaning.silent_within.is_some()
+        let has_cells = is_cut
+            || settings.meaning.silent_within.is_some()
             || settings.meaning.step.is_some()
             || settings.steps.iter().any(Option::is_some);
         if options.learning.is_none() && has_cells {
@@ -301,12 +319,35 @@ impl Settings {
             let first = values(&first[..rows.min(first.len())], &[]);
             settings.world.zero = shift_deviation(&first, &weights, period);
         }
+        let is_stated = asked_noise.is_some() || !options.noise.is_empty();
+        if is_stated && !options.reports && !settings.world.is_on_grid && !instants.is_live() && !instants.has_samples()
+        {
+            let more: Vec<Instant> = instants.peek(MOST_FIRST)?.iter().cloned().collect();
+            settings.hints.extend(settings.doubts(&more, &instants.names));
+        }
         let found = hints(options, &first, &instants.names, apart, settings.has_slope);
         settings.hints.extend(found);
         if options.noise.is_empty() && options.change.is_none() && !options.reports {
             settings.hints.extend(settings.repeating(&first, &instants.names));
         }
         Ok(settings)
+    }
+
+    /// Whether readings say only on which side of an end a measurement is, or within a cell that is wide beside the noise.
+    fn is_cut(&self, options: &TrackOptions, names: &[String]) -> bool {
+        let has_thresholds = options.threshold_column.is_some()
+            || names
+                .iter()
+                .any(|name| self.thresholds.of(name).is_some() && *self.sends.of(name) == Report::Sign);
+        let is_wide = |(sensor, name): (usize, &String)| {
+            let step = self.step_of(sensor).unwrap_or(0.0);
+            step > WIDE_CELL * self.seat(sensor, name).noise
+        };
+        let has_ends = |ends: &limits::Ends| ends.0.is_some() || ends.1.is_some();
+        has_thresholds
+            || self.meaning.has_limits
+            || std::iter::once(&self.meaning.limits).chain(&self.limits).any(has_ends)
+            || names.iter().enumerate().any(is_wide)
     }
 
     pub(super) fn seat_with(&self, sensor: usize, sends: Report, noise: f64, threshold: Option<f64>) -> Seat {

@@ -6,6 +6,10 @@ use serde::Serialize;
 const PRINTED_EVENTS: usize = 12;
 /// Share of rejected reports from which the supposed noise is doubted; of right ones one in a million is rejected.
 const OFTEN: f64 = 0.05;
+/// And so many of them: a few may be spikes, which are no noise.
+const FEWEST_REJECTED: u64 = 5;
+/// Bits are told to be more or less surprising than predicted from so many deviations on: by chance of one sensor in 16000.
+const SURPRISING: f64 = 4.0;
 
 /// What was found over the whole table.
 #[derive(Serialize)]
@@ -40,6 +44,8 @@ pub(super) struct SensorSummary {
     pub(super) gaps: usize,
     /// Reports that were not used because they were too unlikely given the prediction and the others'.
     pub(super) rejected: u64,
+    /// By how many deviations unlikely bits came more often than predicted, of a sensor that sends one bit.
+    pub(super) surprise: Option<f64>,
     /// Standard deviation of its noise, and offset, as supposed.
     pub(super) noise: f64,
     pub(super) offset: f64,
@@ -101,7 +107,8 @@ pub(super) fn lines(summary: &Summary) -> Vec<String> {
     }
     for sensor in summary.sensors.iter().filter(|sensor| sensor.rejected > 0) {
         let reports = sensor.reports + if summary.is_silence_said { sensor.gaps } else { 0 };
-        let is_noisy = sensor.used && sensor.rejected as f64 > OFTEN * reports as f64;
+        let is_noisy =
+            sensor.used && sensor.rejected >= FEWEST_REJECTED && sensor.rejected as f64 > OFTEN * reports as f64;
         lines.push(format!(
             "{}: {} of {reports} reports{} were too unlikely and not used{}",
             sensor.name,
@@ -112,6 +119,19 @@ pub(super) fn lines(summary: &Summary) -> Vec<String> {
             } else {
                 ""
             }
+        ));
+    }
+    for sensor in &summary.sensors {
+        let (more, larger, narrow) = match sensor.surprise {
+            Some(deviations) if deviations > SURPRISING => ("more", "larger", "narrow"),
+            Some(deviations) if deviations < -SURPRISING => ("less", "smaller", "wide"),
+            _ => continue,
+        };
+        lines.push(format!(
+            "{}: unlikely bits came {more} often than predicted ({:.1} deviations): its noise, or the change, is {larger} than stated, and bands are too \
+             {narrow}",
+            sensor.name,
+            sensor.surprise.unwrap_or(0.0).abs()
         ));
     }
     for sensor in summary.sensors.iter().filter(|sensor| !sensor.used) {

@@ -33,8 +33,10 @@ pub(super) struct World {
     pub(super) is_smoothed: bool,
     /// Standard deviation of what the offsets that were found shift all values.
     pub(super) zero: f64,
-    /// Whether silence cuts the belief again and again, so that it is no Gaussian.
-    pub(super) is_cut: bool,
+    /// Whether readings cut the belief so that it is no Gaussian: it is then followed on a grid.
+    pub(super) is_on_grid: bool,
+    /// Whether values are sent on change only.
+    pub(super) is_on_change: bool,
     /// Seconds between rows.
     pub(super) interval: f64,
 }
@@ -98,7 +100,7 @@ impl World {
             _ => {
                 let (world, prior) = (|change| self.walk(change), &self.start(guess)?);
                 let level = Level { world, prior, period };
-                if self.is_cut {
+                if self.is_on_grid && self.is_on_change {
                     level.calibrate_on_grid(instants, change, noises)
                 } else {
                     level.calibrate(instants, change, noises)

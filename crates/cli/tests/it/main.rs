@@ -26,6 +26,7 @@ mod recordings;
 mod streams;
 mod tables;
 mod track;
+mod track_bands;
 mod track_faults;
 mod track_found;
 mod track_kinds;

@@ -89,8 +89,8 @@ impl<L: Fn(f64, &[f64]) -> f64> Search<'_, L> {
         }
     }
 
-    /// Replaces a number by the root of the mean of its square under its likelihood, the other numbers held: what may as well be smaller or larger
-    /// makes bands too narrow more than too wide. Where the likelihood is as high far below, it says nothing but an upper end, and the largest number
+    /// Replaces a number by the root of the mean of its square under its likelihood, the other numbers held, all numbers being equally likely before
+    /// (not their logarithms): what may as well be smaller or larger makes bands too narrow more than too wide. Where the likelihood is as high far below, it says nothing but an upper end, and the largest number
     /// that is not improbable is taken.
     pub(super) fn settle(&mut self, axis: usize) {
         let moved = |by: f64| {
@@ -117,7 +117,7 @@ impl<L: Fn(f64, &[f64]) -> f64> Search<'_, L> {
             let (mut sum, mut squares) = (0.0, 0.0);
             for k in -FAR..=FAR {
                 let by = SETTLED * f64::from(k);
-                let weight = (self.at(&moved(by)) - here).exp();
+                let weight = (self.at(&moved(by)) - here + by).exp();
                 sum += weight;
                 squares += weight * (2.0 * by).exp();
             }

@@ -4,7 +4,7 @@
 //! begins with a report that is rejected, or of a sensor whose test raises an alarm, from a prediction wide enough for it;
 //!     its belief is predicted and updated as the belief is
 //! log ratio = sum over the reports of the other sensors from then on:  ln p(report | alternative) - ln p(report | belief)
-//! log ratio >= 4.6 = ln 100:  its belief becomes the belief
+//! log ratio >= 4.6 = ln 100:  its belief becomes the belief;  also above 1 after 12 reports of the sensor in a row that were rejected
 //! log ratio <= -3:            the sensor with which it began may be excluded
 //! ends when a report of that sensor agrees with the belief, or the sensor is excluded or dead
 //! ```

@@ -138,6 +138,9 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             // The centre's own test leaves out residuals: in a lost track those of different sensors have different signs.
             // Surprises and products do not.
             let Some(found) = in_order.or(*apart) else { continue };
+            if member.always_speaks && reading.slot.observation.received().is_some_and(|bits| bits.bits() == 1) {
+                state.rate.add(found.residual);
+            }
             let product = product(&mut state.last_in_order, found.residual);
             for (sum, term) in pooled.iter_mut().zip([Some(found.surprise), None, product]) {
                 if let Some(term) = term {

@@ -2,15 +2,26 @@
 
 use super::FusionCentre;
 use super::alternative::{Alternative, DECISIVE};
-use super::gate::{FITS, Fate, Verdict, widened};
+use super::gate::{FITS, Fate, INSTANTS_ASTRAY, Verdict, widened};
 use super::reading::{Content, Reading, conditioned};
 use crate::contract::StateFilter;
 use fewbits_core::Gaussian;
 
+/// So many rejected reports in a row, all near the alternative, are no spikes.
+const HELD: u32 = 3 * INSTANTS_ASTRAY;
+/// Log ratio, in nats, above which they are then believed.
+const LIKELIER: f64 = 1.0;
 /// Largest part of one report, in nats.
 const MAX_PART: f64 = 2.0 * DECISIVE;
 
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
+    /// Whether the sensor of an alternative has held to it for long, and the others are for it as far as they can tell: those that are much less
+    /// accurate say little, and each of its reports would be rejected until they decide.
+    pub(super) fn is_held(&self, alternative: &Alternative<D>) -> bool {
+        let astray = self.member(alternative.sensor).map_or(0, |member| member.state.astray);
+        alternative.log_ratio > LIKELIER && astray + 1 >= HELD
+    }
+
     /// The alternative hypothesis after the reports of this instant, and the belief from which it is updated by them.
     pub(super) fn alternative(
         &self,

@@ -35,6 +35,7 @@ mod learning;
 mod log_ratio;
 mod one_wrong;
 mod presence;
+mod rate;
 mod reading;
 mod receive;
 mod remote;
@@ -294,6 +295,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             disputed: state.disputed,
             rejected: state.rejected,
             copies: state.copies,
+            surprise: state.rate.score(),
         })
     }
 

@@ -38,7 +38,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         if self.health == Health::Exclude {
             let found = self.alternative(&predicted, &readings, &verdicts);
             let jumped = found
-                .filter(|(alternative, _)| alternative.is_believed())
+                .filter(|(alternative, _)| alternative.is_believed() || self.is_held(alternative))
                 .map(|(_, wide)| {
                     let again = self.gate(&Law::Moments(wide), &wide, &readings);
                     (wide, again)

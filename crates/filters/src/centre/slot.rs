@@ -51,4 +51,8 @@ pub struct SensorState {
     pub rejected: u64,
     /// Number of copies of its reports that were dropped.
     pub copies: u64,
+    /// Of a sensor that sends one bit: by how many standard deviations unlikely bits came more often than predicted. Above about 4 its noise or
+    /// the process noise is larger than stated, below -4 smaller. `None` if too few bits had unequal probabilities: those whose threshold is the
+    /// prediction never have.
+    pub surprise: Option<f64>,
 }

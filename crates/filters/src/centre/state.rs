@@ -3,6 +3,7 @@
 use super::alternative::StoredAlternative;
 use super::health::Monitor;
 use super::presence::{Outage, Presence};
+use super::rate::Rate;
 use super::repeats::Repeats;
 use super::{FusionCentre, Slot};
 use crate::Error;
@@ -42,6 +43,8 @@ pub(super) struct MemberState {
     /// Number of copies of reports that were dropped.
     pub copies: u64,
     pub repeats: Repeats,
+    #[serde(default, skip_serializing_if = "Rate::is_empty")]
+    pub rate: Rate,
 }
 
 impl MemberState {
@@ -59,6 +62,7 @@ impl MemberState {
             astray: 0,
             copies: 0,
             repeats: Repeats::new(),
+            rate: Rate::default(),
         }
     }
 

@@ -427,6 +427,48 @@ fn a_jump_is_told_from_a_wrong_sensor_by_less_accurate_ones() {
     }
 }
 
+/// Instants at which the level is more than a unit off, of two sensors of noise .1 and 10 that report together. From instant 100 on the level is 4
+/// higher, or `burst` values of the accurate sensor are.
+fn off_beside_a_far_worse_sensor(seed: u64, burst: Option<u32>) -> u32 {
+    let mut rng = Stream::new(seed).rng();
+    let walk = ContinuousLinear::random_walk(0.0025).unwrap();
+    let prior = Gaussian::scalar(20.0, 1.0).unwrap();
+    let mut centre = FusionCentre::new(&mut rng, walk, MomentFilter, &prior).unwrap();
+    for (number, variance) in [(0, 0.01), (1, 100.0)] {
+        let reporting = Reporting::values(
+            LinearSensor::direct(variance).unwrap(),
+            FullValue::new(variance).unwrap(),
+            Link::PERFECT,
+        );
+        centre.join(number, reporting).unwrap();
+    }
+    let (mut level, mut off) = (20.0, 0);
+    for k in 1..=200_u32 {
+        level += 0.05 * noise(&mut rng) + if k == 100 && burst.is_none() { 4.0 } else { 0.0 };
+        let wild = burst.is_some_and(|burst| (100..100 + burst).contains(&k));
+        let sent = [
+            level + 0.1 * noise(&mut rng) + if wild { 4.0 } else { 0.0 },
+            level + 10.0 * noise(&mut rng),
+        ];
+        centre.advance(&mut rng, f64::from(k)).unwrap();
+        centre.receive(&mut rng, &[slot(0, sent[0]), slot(1, sent[1])]).unwrap();
+        off += u32::from((centre.estimate().mean()[0] - level).abs() > 1.0);
+    }
+    off
+}
+
+/// Defect: the accurate sensor was rejected until the other decided, for up to 65 instants.
+#[test]
+fn a_jump_that_only_one_of_two_sensors_can_see_is_followed() {
+    let mut off: Vec<u32> = (0..40).map(|seed| off_beside_a_far_worse_sensor(seed, None)).collect();
+    off.sort_unstable();
+    assert!(off[20] <= 20 && off[35] <= 60, "{off:?}");
+    let off: Vec<u32> = (0..40)
+        .map(|seed| off_beside_a_far_worse_sensor(seed, Some(6)))
+        .collect();
+    assert!(off.iter().all(|off| *off == 0), "{off:?}");
+}
+
 /// While it holds a second belief, a centre is stored and restored to the bit, and a state with a damaged one is refused.
 #[test]
 fn a_centre_in_doubt_is_restored() {

@@ -6,6 +6,15 @@ use fewbits_numerics::normal;
 
 /// Smallest number of values of a sample.
 const MIN_SAMPLE: usize = 5;
+/// Factors of Silverman's bandwidth among which the likeliest is chosen. His rule is for one mode: of two modes that are far apart the best
+/// bandwidth is about a quarter of it.
+const FACTORS: [f64; 7] = [1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.12];
+/// Number of values whose density is compared, at most.
+const MAX_COMPARED: usize = 500;
+/// Normal densities farther than so many bandwidths do not count.
+const REACH: f64 = 6.0;
+/// Smallest density that is assumed of a value, as a share of the uniform one over the range: a value far from all others must not decide.
+const LEAST_SHARE: f64 = 1e-9;
 
 /// Errors of a prior that was estimated from a sample: by smoothing, and because the sample is finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,41 +43,51 @@ pub(super) fn drawn_together(
     values.iter().map(move |x| mean + shrink * (x - mean))
 }
 
-/// Values at which bandwidths are compared, at most.
-const COMPARED: usize = 300;
-/// A narrower bandwidth must be likelier than Silverman's by so many nats.
-const DECISIVE: f64 = 10.0;
-/// Share of a wide normal density in the comparison, so that one value far from all others does not decide it.
-const WIDE_SHARE: f64 = 0.01;
-/// Half-octaves of narrower bandwidths that are tried.
-const NARROWER: i32 = 14;
-
-/// Silverman's bandwidth `widest`, or a narrower one of half-octaves below it under which the values are decisively likelier, each under the density
-/// of the others. Silverman's rule smooths a density of several peaks far too much.
-///
-/// Equal values are left out together, so that a sample of rounded values is not taken for points.
-fn bandwidth(sorted: &[f64], mean: f64, deviation: f64, widest: f64) -> f64 {
-    let n = sorted.len();
-    let chosen: Vec<f64> = sorted.iter().copied().step_by(n.div_ceil(COMPARED)).collect();
-    let log_likelihood = |width: f64| -> f64 {
-        let log = |x: &f64| {
-            let range =
-                sorted.partition_point(|y| *y < x - 6.0 * width)..sorted.partition_point(|y| *y <= x + 6.0 * width);
-            let others = sorted[range].iter().filter(|y| *y != x);
-            let near = others.map(|y| normal::pdf((x - y) / width)).sum::<f64>() / (n as f64 * width);
-            ((1.0 - WIDE_SHARE) * near + WIDE_SHARE * normal::pdf((x - mean) / deviation) / deviation).ln()
-        };
-        chosen.iter().map(log).sum::<f64>() * (n as f64 / chosen.len() as f64)
+/// Sorted values of which equal ones are spread evenly over the smallest difference of two values, as they were before rounding. Otherwise the
+/// narrowest bandwidth would explain them best.
+fn without_ties(values: &[f64]) -> Vec<f64> {
+    let differences = values.windows(2).map(|pair| pair[1] - pair[0]);
+    let step = differences
+        .filter(|difference| *difference > 0.0)
+        .fold(f64::INFINITY, f64::min);
+    let groups = values.chunk_by(|one, other| one == other);
+    let spread = |group: &[f64]| {
+        let (first, count) = (group[0], group.len());
+        (0..count).map(move |k| first + step * ((k as f64 + 0.5) / count as f64 - 0.5))
     };
-    let first = (widest, log_likelihood(widest));
-    let narrower = (1..=NARROWER).map(|k| widest * 0.5_f64.powf(0.5 * f64::from(k)));
-    let tried = narrower.map(|width| (width, log_likelihood(width)));
-    let best = tried.fold(first, |best, next| if next.1 > best.1 { next } else { best });
-    if best.1 > first.1 + DECISIVE { best.0 } else { widest }
+    groups.flat_map(spread).collect()
 }
 
-/// Sorts a sample; returns its fit with Silverman's bandwidth `0.9 min(s, IQR / 1.34) n^(-1/5)` or a decisively likelier one, its mean and its
-/// standard deviation.
+/// The bandwidth, among factors of `largest`, under which values are likeliest given all others (leave-one-out likelihood; Silverman 1986, 3.4.4).
+fn likeliest(values: &[f64], largest: f64) -> f64 {
+    let values = without_ties(values);
+    let count = values.len();
+    let range = values[count - 1] - values[0];
+    let log_likelihood = |bandwidth: f64| {
+        let least = LEAST_SHARE * count as f64 * bandwidth / range;
+        let density = |own: usize| {
+            let value = values[own];
+            let from = values.partition_point(|x| *x < value - REACH * bandwidth);
+            let near = values[from..].iter().take_while(|x| **x <= value + REACH * bandwidth);
+            let sum: f64 = near.map(|x| (-0.5 * ((x - value) / bandwidth).powi(2)).exp()).sum();
+            // Less its own.
+            (sum - 1.0).max(least) / bandwidth
+        };
+        let compared = (0..count).step_by(count.div_ceil(MAX_COMPARED));
+        compared.map(|own| density(own).ln()).sum::<f64>()
+    };
+    let mut best = (f64::NEG_INFINITY, largest);
+    for bandwidth in FACTORS.map(|factor| factor * largest) {
+        let found = log_likelihood(bandwidth);
+        if found > best.0 {
+            best = (found, bandwidth);
+        }
+    }
+    best.1
+}
+
+/// Sorts a sample; returns its fit, its mean and its standard deviation. The bandwidth is the likeliest one that is not above Silverman's
+/// `0.9 min(s, IQR / 1.34) n^(-1/5)`.
 pub(super) fn fitted(values: &mut [f64]) -> Result<(SampleFit, f64, f64), Error> {
     all_finite("values", values)?;
     let count = values.len();
@@ -88,7 +107,7 @@ pub(super) fn fitted(values: &mut [f64]) -> Result<(SampleFit, f64, f64), Error>
     let spread = (quartile(0.75) - quartile(0.25)) / 1.34;
     // If half of the values are equal, the interquartile range is zero and is not used.
     let spread = if spread > 0.0 { spread.min(deviation) } else { deviation };
-    let bandwidth = bandwidth(values, mean, deviation, 0.9 * spread * n.powf(-0.2));
+    let bandwidth = likeliest(values, 0.9 * spread * n.powf(-0.2));
     let centres: Vec<f64> = drawn_together(values, mean, deviation, bandwidth).collect();
     let smooth = |y: f64| centres.iter().map(|c| normal::cdf((y - c) / bandwidth)).sum::<f64>() / n;
     // 200 points find the largest difference with an error well below the sampling error.
