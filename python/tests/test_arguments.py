@@ -298,11 +298,11 @@ def test_masked_and_missing_cells_are_nan():
 
 
 def test_whole_numbers_that_no_double_holds_are_not_rounded():
-    large = 2**53 + 1
+    large = 2**60 + 1
     for given, bound in (([large, 3], 0.5), (np.array([large]), 0.5), (np.ma.array([large, 2], mask=[0, 1]), None), (pd.Series([large, None], dtype="Int64"), None)):
         with pytest.raises(fb.ArgumentError, match="samples"):
             fb.encode(given, bound)
-    assert fb.decode(fb.encode(np.array([2**53]), 0.5)) == 2**53 and fb.decode(fb.encode([float(large)], 0.5)) == 2**53
+    assert fb.decode(fb.encode(np.array([2**53]), 0.5)) == 2**53 and fb.decode(fb.encode([float(large)], 0.5)) == 2**60
 
 
 def test_masks_of_callbacks_are_no_numbers():

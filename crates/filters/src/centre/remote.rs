@@ -218,7 +218,7 @@ fn factor_of<C: Scheme<M>, const M: usize>(
         Observation::Nothing => Observation::Nothing,
         Observation::Lost => Observation::Lost,
     };
-    Ok(scheme.factor(&feedback, &observation, &supposed(link, working)?)?)
+    scheme.factor(&feedback, &observation, &supposed(link, working)?)
 }
 
 impl<const D: usize, const M: usize, S, C, A> RemoteSensor<D> for Reporting<S, C, A, M>
