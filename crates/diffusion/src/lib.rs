@@ -39,7 +39,7 @@
 //! `h`. To estimate it, solve with two widths.
 //!
 //! The feature `assembly`, which is on by default, multiplies dense blocks of the factorisations by kernels in assembly, which are 1.9 MB of
-//! code on x86-64. Without it plans of 10,000 and 90,000 cells in time took as long within 3 % (Cholesky); results differ by rounding.
+//! code on x86-64. Without it a plan of 10,000 cells took as long, one of 90,000 cells 7 % longer (steps in time, Cholesky).
 //!
 //! Not here: turbulence, buoyancy, pressure; the closed forms of a half-space (`fewbits_models::diffusion`); estimation
 //! of the source (`fewbits_diffusive`).
