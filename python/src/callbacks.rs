@@ -154,6 +154,7 @@ pub(crate) fn returned<'py>(
     count: usize,
 ) -> Outcome<PyReadonlyArray1<'py, f64>> {
     let expected = || format!("{count} numbers, one per {what}");
+    let given = &crate::array::unmasked(given).or_else(|_| refused(name, crate::array::shown(given), expected()))?;
     let Ok(array) = given.cast::<PyArray1<f64>>() else {
         // Integers, single precision, lists: NumPy converts them.
         return match crate::array::numbers::<f64>(given) {

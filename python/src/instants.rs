@@ -22,6 +22,7 @@ pub(crate) struct Long<'a> {
 }
 
 /// What a cell says of its sensor; nothing if the cell is missing (null, or not finite) and its sensor was not due.
+#[inline]
 pub(crate) fn sample(number: usize, missing: Missing, cell: Option<f64>) -> Option<(usize, Option<f64>)> {
     let cell = cell.filter(|x| x.is_finite());
     (cell.is_some() || missing == Missing::Silence).then_some((number, cell))
@@ -48,12 +49,16 @@ impl Instants {
     pub(crate) fn iter(&self) -> impl Iterator<Item = Instant> {
         (0..self.len()).map(|row| match self {
             Self::Wide { seconds, columns } => {
-                let cells = columns.iter().enumerate();
-                let samples = cells.filter_map(|(number, (cells, missing))| sample(number, *missing, cells[row]));
+                let mut samples = SmallVec::new();
+                for (number, (cells, missing)) in columns.iter().enumerate() {
+                    if let Some(sample) = sample(number, *missing, cells[row]) {
+                        samples.push(sample);
+                    }
+                }
                 Instant {
                     seconds: seconds[row],
                     row,
-                    samples: samples.collect(),
+                    samples,
                 }
             }
             Self::Long(instants) => instants[row].clone(),

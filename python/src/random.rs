@@ -6,7 +6,7 @@ use crate::given::named;
 use crate::stored::{self, Reduced};
 use fewbits_filters::Resampling;
 use fewbits_monte_carlo::Stream;
-use fewbits_numerics::kernels::StandardNormals;
+use fewbits_numerics::kernels::{StandardNormals, vectorised};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -116,10 +116,15 @@ impl Generator {
             for cells in cells.chunks_mut(BLOCK) {
                 let normals = &mut normals[..cells.len()];
                 self.normals.fill(normals);
-                cells
-                    .iter_mut()
-                    .zip(normals)
-                    .for_each(|(x, normal)| *x += deviation * *normal);
+                vectorised(
+                    #[inline(always)]
+                    || {
+                        cells
+                            .iter_mut()
+                            .zip(normals)
+                            .for_each(|(x, normal)| *x += deviation * *normal);
+                    },
+                );
             }
         };
         match cells.as_slice_mut() {

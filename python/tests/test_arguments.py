@@ -297,6 +297,23 @@ def test_masked_and_missing_cells_are_nan():
         fb.design(prior=(0.0, 1.0), noise=[1.0], bits=[1]).encode(masked.reshape(-1, 1))
 
 
+def test_whole_numbers_that_no_double_holds_are_not_rounded():
+    large = 2**60 + 1
+    for given, bound in (([large, 3], 0.5), (np.array([large]), 0.5), (np.ma.array([large, 2], mask=[0, 1]), None), (pd.Series([large, None], dtype="Int64"), None)):
+        with pytest.raises(fb.ArgumentError, match="samples"):
+            fb.encode(given, bound)
+    assert fb.decode(fb.encode(np.array([2**53]), 0.5)) == 2**53 and fb.decode(fb.encode([float(large)], 0.5)) == 2**60
+
+
+def test_masks_of_callbacks_are_no_numbers():
+    hidden = np.ma.array(np.zeros((1, 4)), mask=[[1, 0, 0, 0]])
+    for move, likelihood in ((lambda x, dt, rng: None, lambda x, z: hidden[0]), (lambda x, dt, rng: hidden, lambda x, z: x[0])):
+        with pytest.raises(fb.Error, match="number"):
+            fb.ParticleFilter(np.zeros((1, 4)), move, likelihood, seed=1).run([1.0])
+    plain = fb.ParticleFilter(np.zeros((1, 4)), lambda x, dt, rng: np.ma.array(x + 1), lambda x, z: np.ma.array(-x[0]), seed=1)
+    assert plain.run([1.0]).mean == 1.0
+
+
 @pytest.mark.parametrize("bits", [[0.5], [257], [1, -1.5], np.array([3e9])])
 def test_whole_numbers_are_not_cut(bits):
     with pytest.raises(fb.ArgumentError, match="bits"):

@@ -481,3 +481,29 @@ def test_objects_of_python_are_named():
         pytest.skip("polars reads NumPy's times in rows")
     with pytest.raises(fb.ArgumentError, match="'t' of Python objects"):
         fb.fit(rows, time="t")
+
+
+def test_columns_keep_masks_and_zones():
+    stamps = np.array(["2026-01-01", "NaT", "2026-01-03"], "M8[s]")
+    given = {"x": np.array([1.0, 2.0, 3.0]), "n": np.array([1, 2, 3]), "b": np.array([True, False, True]), "t": stamps}
+    table = pa.table(fb.Table({name: np.ma.array(column, mask=[1, 0, 0]) for name, column in given.items()}))
+    assert table["x"].to_pylist() == [None, 2.0, 3.0] and table["n"].to_pylist() == [None, 2, 3] and table["b"].to_pylist() == [None, False, True]
+    assert table["t"].to_pylist() == [None, None, datetime(2026, 1, 3)]
+    for zoned in (pl.Series(STAMPS).dt.convert_time_zone(ZONE), pd.Series(pd.DatetimeIndex(STAMPS).tz_convert(ZONE))):
+        table = pa.table(fb.Table({"t": zoned}))
+        assert table.schema.field("t").type == pa.timestamp("ns", ZONE) and table["t"].to_pylist() == STAMPS
+    offset = pd.Series(pd.DatetimeIndex(STAMPS).tz_convert(timezone(timedelta(hours=2))))
+    assert pl.DataFrame(fb.Table({"t": offset}))["t"].to_list() == STAMPS
+    # They would be the years 1830 and 1970.
+    for wrong in (np.array(["3000-01-01"], "M8[s]"), np.array([1500], "M8[ps]"), np.array([2**63], "u8")):
+        with pytest.raises(fb.ArgumentError, match="columns"):
+            fb.Table({"t": wrong})
+
+
+def test_periods_are_no_seconds(tmp_path):
+    frame = pd.DataFrame({"t": pd.period_range("2026", periods=3, freq="D"), "a": [0.2, 0.3, 0.4]})
+    centre = fb.FusionCentre(fb.Model.walk(0.1), mean=0.0, deviation=1.0)
+    centre.join("a", noise=0.5)
+    for use in (lambda: centre.run(frame, time="t"), lambda: fb.write(frame, tmp_path / "a.fewb", time="a")):
+        with pytest.raises(fb.ArgumentError, match="periods"):
+            use()

@@ -29,6 +29,7 @@ pub trait Message: Sized {
     ///
     /// # Errors
     /// As [`Message::encode`].
+    #[inline]
     fn to_bits(&self, format: &Self::Format) -> Result<BitString, CodecError> {
         let mut writer = BitWriter::new();
         self.encode(format, &mut writer)?;
@@ -39,6 +40,7 @@ pub trait Message: Sized {
     ///
     /// # Errors
     /// As [`Message::decode`], or if bits are left over.
+    #[inline]
     fn from_bits(format: &Self::Format, bits: &BitString) -> Result<Self, CodecError> {
         let mut reader = BitReader::new(bits);
         let message = Self::decode(format, &mut reader)?;

@@ -3,7 +3,7 @@
 use crate::Error;
 use fewbits_densities::{Particles, systematic_into};
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::kernels::sum;
+use fewbits_numerics::kernels::{sum, vectorised};
 use rand::{Rng, RngExt};
 use rand_distr::Open01;
 use serde::{Deserialize, Serialize};
@@ -108,8 +108,12 @@ impl Resampling {
 /// Sum of the weights and the index of the last positive one.
 fn check(weights: &[f64]) -> Result<(f64, usize), ArgumentError> {
     let is_weight = |w: &f64| *w >= 0.0 && *w < f64::INFINITY;
-    // A loop without an early exit runs in vector registers.
-    if !weights.iter().fold(true, |all, w| all & is_weight(w)) {
+    // Without an early exit this runs in vector registers.
+    let bad = vectorised(
+        #[inline(always)]
+        || weights.iter().fold(0_u64, |bad, w| bad | u64::from(!is_weight(w))),
+    );
+    if bad > 0 {
         let bad = weights.iter().find(|w| !is_weight(w)).copied().unwrap_or(f64::NAN);
         return Err(ArgumentError::new("weights", bad, "finite weights, 0 or above"));
     }

@@ -114,6 +114,7 @@ pub fn entries(name: &'static str, given: usize, expected: usize) -> Result<(), 
 }
 
 /// Accepts slices whose entries are all finite.
+#[inline]
 pub fn all_finite(name: &'static str, values: &[f64]) -> Result<(), ArgumentError> {
     match values.iter().position(|v| !v.is_finite()) {
         None => Ok(()),

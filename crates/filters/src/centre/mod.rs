@@ -311,6 +311,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         Ok(&self.members[self.seated(number, 0)?])
     }
 
+    #[inline]
     fn seated(&self, number: u32, guess: usize) -> Result<usize, Error> {
         let seated = self.members.len();
         let expected = || format!("one of the {seated} sensors that have joined");

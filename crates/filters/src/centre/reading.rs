@@ -180,6 +180,7 @@ impl<const D: usize> Member<D> {
     }
 
     /// Tests a report by a Gaussian.
+    #[inline]
     pub(super) fn test(&self, reading: &Reading<'_, D>, given: &Gaussian<D>) -> Tested {
         let evidence = reading.known().map(|known| known.evidence(given));
         match evidence {

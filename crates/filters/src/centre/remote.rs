@@ -202,18 +202,28 @@ impl<S, C, A, const M: usize> Reporting<S, C, A, M> {
         S: Clone,
         C: Scheme<M>,
     {
-        let feedback = C::Feedback::from_bits(&self.scheme.feedback_format(), &slot.feedback)?;
-        let observation = match &slot.observation {
-            // Bits that are no report of the scheme: a report was sent, but not understood.
-            Observation::Received(bits) => C::Report::from_bits(&self.scheme.report_format(), bits)
-                .map_or(Observation::Lost, Observation::Received),
-            Observation::Nothing => Observation::Nothing,
-            Observation::Lost => Observation::Lost,
-        };
-        let link = supposed(&self.link, working)?;
-        let factor = self.scheme.factor(&feedback, &observation, &link)?;
+        let factor = factor_of(&self.scheme, &self.link, slot, working)?;
         Ok(Observed::new(self.sensing.clone(), factor))
     }
+}
+
+/// What a slot says of the measurement. Its code does not depend on the state's dimension.
+fn factor_of<C: Scheme<M>, const M: usize>(
+    scheme: &C,
+    link: &Link,
+    slot: &Slot,
+    working: f64,
+) -> Result<C::Factor, Error> {
+    let feedback = C::Feedback::from_bits(&scheme.feedback_format(), &slot.feedback)?;
+    let observation = match &slot.observation {
+        // Bits that are no report of the scheme: a report was sent, but not understood.
+        Observation::Received(bits) => {
+            C::Report::from_bits(&scheme.report_format(), bits).map_or(Observation::Lost, Observation::Received)
+        }
+        Observation::Nothing => Observation::Nothing,
+        Observation::Lost => Observation::Lost,
+    };
+    scheme.factor(&feedback, &observation, &supposed(link, working)?)
 }
 
 impl<const D: usize, const M: usize, S, C, A> RemoteSensor<D> for Reporting<S, C, A, M>

@@ -78,14 +78,16 @@ impl Words {
         word
     }
 
-    fn fill(&mut self, words: &mut [u64]) {
+    /// Random words, and the uniform numbers of [`split`] in them.
+    fn fill(&mut self, words: &mut [u64], uniforms: &mut [f64]) {
         let count = words.len() as u64;
         let from = self.clone();
         vectorised(
             #[inline(always)]
             || {
-                for (i, word) in words.iter_mut().enumerate() {
+                for (i, (word, uniform)) in words.iter_mut().zip(uniforms).enumerate() {
                     *word = from.word(i as u64);
+                    *uniform = split(*word).1;
                 }
             },
         );
@@ -169,12 +171,12 @@ impl StandardNormals {
     /// Fills `out` with independent `N(0, 1)` draws. They depend only on the seed and on the lengths of this and earlier calls.
     pub fn fill(&mut self, out: &mut [f64]) {
         let table = ziggurat();
-        let mut words = [0_u64; BLOCK];
+        let (mut words, mut uniforms) = ([0; BLOCK], [0.0; BLOCK]);
         for block in out.chunks_mut(BLOCK) {
-            self.words.fill(&mut words[..block.len()]);
+            self.words.fill(&mut words[..block.len()], &mut uniforms);
             // Looking up the table in vector registers would need gathers; a branch that is taken one time in eighty is cheaper.
-            for (z, word) in block.iter_mut().zip(&words) {
-                let (layer, uniform) = split(*word);
+            for ((z, word), uniform) in block.iter_mut().zip(&words).zip(&uniforms) {
+                let layer = layer(*word);
                 let x = uniform * table.x[layer];
                 *z = if x.abs() < table.x[layer + 1] {
                     x
@@ -191,7 +193,12 @@ impl StandardNormals {
 fn split(bits: u64) -> (usize, f64) {
     // A number in [2, 4) less 3, plus half a step of 2^-51: symmetric, never an end.
     let mantissa = f64::from_bits((bits >> 12) | 0x4000_0000_0000_0000);
-    ((bits & 0xff) as usize, (mantissa - 3.0) + f64::EPSILON)
+    (layer(bits), (mantissa - 3.0) + f64::EPSILON)
+}
+
+#[inline(always)]
+fn layer(bits: u64) -> usize {
+    (bits & 0xff) as usize
 }
 
 #[cfg(test)]
@@ -206,7 +213,7 @@ mod tests {
             step: 0x9e37_79b9_7f4a_7c15,
         };
         let mut block = [0; 5];
-        words.clone().fill(&mut block);
+        words.clone().fill(&mut block, &mut [0.0; 5]);
         assert_eq!(block[..2], [6_457_827_717_110_365_317, 3_203_168_211_198_807_973]);
         assert_eq!(block[2..4], [9_817_491_932_198_370_423, 4_593_380_528_125_082_431]);
         assert_eq!(block[4], 16_408_922_859_458_223_821);
