@@ -22,6 +22,7 @@ mod estimate;
 mod fit;
 mod gaussian;
 mod heights;
+mod line;
 mod mirror;
 mod mistakes;
 mod moved;
