@@ -111,8 +111,13 @@ pub(super) struct Roles {
     pub(super) told: Vec<String>,
 }
 
+/// Whether a column of this name has the names of anchors.
+pub(super) fn is_place(word: &str) -> bool {
+    LABELS[PLACED..].contains(&word)
+}
+
 /// The words of a name, in small letters.
-fn words(name: &str) -> Vec<String> {
+pub(super) fn words(name: &str) -> Vec<String> {
     let name = name.to_lowercase();
     let parts = name.split(|letter: char| !letter.is_alphanumeric());
     parts.filter(|part| !part.is_empty()).map(str::to_owned).collect()

@@ -1,6 +1,7 @@
 //! The height of a target of `ranges`, where no option says it.
 
 use super::anchors::Anchor;
+use super::mistakes::limit;
 use super::rows::Instants;
 use crate::arguments::RangesOptions;
 use crate::error::Error;
@@ -34,6 +35,10 @@ pub(super) fn height_found(
                 ranges.push((instant.seconds, name.as_str(), range));
             }
         }
+    }
+    // Limits are no distances: and would tell of a height that is not there.
+    if let Some(limit) = limit(ranges.iter().map(|(_, anchor, range)| (*anchor, *range))) {
+        ranges.retain(|(_, _, range)| *range < limit);
     }
     // What is wrong with a range is said when its row is read.
     Ok(height_of(anchors, settings, &ranges).unwrap_or(None))

@@ -40,6 +40,7 @@ mod late;
 mod level;
 mod limits;
 mod meaning;
+mod mistakes;
 mod odometry;
 mod path;
 mod ranges;
@@ -51,6 +52,7 @@ mod sensors;
 mod settings;
 mod stuck;
 mod summary;
+mod targets;
 mod world;
 
 use crate::Ending;
@@ -95,8 +97,10 @@ pub(crate) fn ranges(options: &RangesOptions) -> Result<Ending, Error> {
     if table.by.is_none() && !table.columns.is_empty() {
         table.columns.extend(options.odometry.iter().cloned());
     }
+    let anchors = anchors::read_anchors(&options.anchors)?;
+    targets::refuse_several(&table, &anchors)?;
     let instants = Instants::open(&table, &kind)?;
     let mut options = options.clone();
     options.table.by.clone_from(&instants.roles.by);
-    ranges::run(&options, instants)
+    ranges::run(&options, &anchors, instants)
 }

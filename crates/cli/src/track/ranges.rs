@@ -1,9 +1,10 @@
 //! Tracking of a position by distances to anchors.
 
-use super::anchors::{Anchor, read_anchors};
+use super::anchors::Anchor;
 use super::divisor::common_divisor;
 use super::height::height_found;
 use super::instant::Instant;
+use super::mistakes::{FIRST_RANGES, limited, mistake};
 use super::odometry::Odometry;
 use super::path;
 use super::report::{first_cell, first_name, summarise};
@@ -138,9 +139,8 @@ fn cells(found: Option<&RangeEstimate>, axes: usize) -> Vec<Cell> {
 }
 
 /// Runs the task.
-pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<Ending, Error> {
+pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Instants) -> Result<Ending, Error> {
     let file = &options.anchors;
-    let anchors = read_anchors(file)?;
     let travel = match sensors::parse(&options.send)? {
         Report::Value | Report::Censored { .. } => Travel::Full,
         Report::Sign => Travel::Bits(1),
@@ -150,7 +150,7 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
     let mut settings = settings(options)?;
     let mut hints = instants.roles.told.clone();
     let is_flat = anchors.iter().all(|(_, place)| place.z == 0.0);
-    if let Some(height) = height_found(options, &anchors, settings, &mut instants)? {
+    if let Some(height) = height_found(options, anchors, settings, &mut instants)? {
         settings.height = Height::Known(height);
         let height = short(height);
         hints.push(if is_flat {
@@ -168,7 +168,7 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
     }
     let mut tracker = RangeTracker::new(anchors.iter().cloned(), travel, settings).map_err(refused)?;
     let known = |name: &str| anchors.iter().position(|(known, _)| known == name);
-    let odometry = Odometry::new(options, &anchors, &instants)?;
+    let odometry = Odometry::new(options, anchors, &instants)?;
     let is_stray = |name: &&String| known(name).is_none() && odometry.axis(name).is_none();
     if let Some(name) = instants.names.iter().find(is_stray) {
         return Err(unknown(instants.file(), name, file));
@@ -200,8 +200,9 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
             .collect(),
     };
     let mut places = Thinned::new();
-    let apart = farthest(&anchors);
+    let apart = farthest(anchors);
     let (mut long, mut small) = (0, 0);
+    let mut first: Vec<(f64, usize, f64)> = Vec::new();
     let (mut rounding, mut noise) = (0.0, f64::INFINITY);
     while let Some(instant) = instants.next()? {
         let (mut found, mut ranges, mut events) = (None, 0, "");
@@ -236,6 +237,9 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
             long += usize::from(range > LONG * apart);
             small += usize::from(range < SHORT * apart);
             rounding = common_divisor(rounding, range);
+            if first.len() < FIRST_RANGES {
+                first.push((instant.seconds, anchor, range));
+            }
             ranges += 1;
         }
         summary.rows += 1;
@@ -283,7 +287,7 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
         return Err(Error::empty(instants.file(), "rows"));
     }
     if let Some(file) = &options.plot {
-        path::picture(&anchors, places.points(), summary.ranges, summary.bits_per_range).save(file)?;
+        path::picture(anchors, places.points(), summary.ranges, summary.bits_per_range).save(file)?;
     }
     summary.hints = hints;
     if summary.losses as u64 > summary.rows / OFTEN && !options.unknown_clock {
@@ -298,6 +302,13 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
         summary.hints.push(format!(
             "most ranges are many times {than} than the anchors are apart, {apart}: bring both to one unit, and take a constant delay off the ranges"
         ));
+    }
+    summary.hints.extend(limited(&first));
+    let is_wrong = |one: &AnchorSummary| one.works < 0.5 || one.own_bias.is_some();
+    let is_suspect =
+        summary.losses > 0 || OFTEN * summary.doubtful > summary.rows || summary.anchors.iter().any(is_wrong);
+    if is_suspect {
+        summary.hints.extend(mistake(anchors, settings, &first));
     }
     let own = rounding / 12.0_f64.sqrt();
     if own > noise && options.anchor_bias.is_none() {

@@ -208,3 +208,78 @@ fn rounded_ranges_are_told_with_the_mend() {
     let input = table(5, 80, |_, i| (distance(&places[i], &truth) / 0.5).round() * 0.5);
     assert!(holds(ranges(folder.path(), &input, &mend).last().unwrap(), &truth));
 }
+
+/// Rows of two targets were mixed into one path without a word, 3 m off under a narrow band.
+#[test]
+fn several_targets_are_refused_with_the_mend() {
+    let folder = tempfile::tempdir().unwrap();
+    anchors(folder.path(), &RECTANGLE, 1.0, false);
+    let words = [
+        "ranges",
+        "t.csv",
+        "--anchors",
+        "anchors.csv",
+        "--by",
+        "anchor",
+        "--columns",
+        "range",
+    ];
+    let write = |column: &str, label: &dyn Fn(usize) -> String| {
+        let mut input = format!("time,{column},anchor,range\n");
+        for row in 0..200 {
+            let truth = if row % 2 == 0 { [4.0, 2.0, 0.0] } else { [9.0, 5.0, 0.0] };
+            let range = distance(&RECTANGLE[row / 2 % 4], &truth);
+            input += &format!("{},{},n{},{range}\n", 0.1 * (row / 2) as f64, label(row), row / 2 % 4);
+        }
+        std::fs::write(folder.path().join("t.csv"), input).unwrap();
+    };
+    for (column, label) in [("tag", "t"), ("id", "badge "), ("target", "")] {
+        write(column, &|row| format!("{label}{}", row % 2));
+        let error = refused(folder.path(), &words, b"");
+        assert!(error.contains("names 2 targets") && error.contains("split the table"), "{error}");
+    }
+    // One target, a counter, and another name of the anchors.
+    for label in [
+        |_| "t".to_owned(),
+        |row: usize| row.to_string(),
+        |row: usize| format!("b{}", row / 2 % 4),
+    ] {
+        write("id", &label);
+        assert!(fewbits(folder.path(), &words, b"").status.success());
+    }
+}
+
+/// Anchors whose names are exchanged, and ranges that are no distances: the mend is told.
+#[test]
+fn mistakes_of_tables_are_told_with_the_mend() {
+    let folder = tempfile::tempdir().unwrap();
+    let places = [
+        [0.0, 0.0, 0.0],
+        [14.0, 1.0, 0.0],
+        [13.0, 10.0, 0.0],
+        [-1.0, 9.0, 0.0],
+        [6.0, 12.0, 0.0],
+    ];
+    anchors(folder.path(), &places, 1.0, false);
+    let said = |range: &dyn Fn(usize, f64) -> f64, swapped: bool| {
+        let mut numbers = Numbers(3);
+        let input = table(5, 80, |row, i| {
+            let angle = 0.06 * row as f64;
+            let truth = [6.0 + 3.0 * angle.sin(), 5.0 + 2.5 * (0.8 * angle).cos(), 0.0];
+            let place = match i {
+                1 | 2 if swapped => 3 - i,
+                _ => i,
+            };
+            range(i, distance(&places[place], &truth) + 0.05 * numbers.normal())
+        });
+        text(&fewbits(folder.path(), &["ranges", "-", "--anchors", "anchors.csv"], input.as_bytes()).stderr).to_owned()
+    };
+    let right = said(&|_, range| range, false);
+    assert!(!right.contains("as if") && !right.contains("--missing"), "{right}");
+    let swapped = said(&|_, range| range, true);
+    assert!(swapped.contains("anchors n1 and n2 had each other's place"), "{swapped}");
+    let times = said(&|_, range| range / 0.149_896_229, false);
+    assert!(times.contains("multiply them by 0.149896229"), "{times}");
+    let limited = said(&|_, range| range.min(8.0), false);
+    assert!(limited.contains("--missing 8 leaves them out"), "{limited}");
+}

@@ -2,6 +2,7 @@
 
 use super::RangeTracker;
 use super::bank::Hypothesis;
+use super::odds::shares_of;
 use crate::Error;
 
 /// An anchor's own bias is told if it is so many deviations from zero.
@@ -42,7 +43,7 @@ impl RangeTracker {
     /// If there is no such anchor.
     pub fn works(&self, anchor: &str) -> Result<f64, Error> {
         let number = self.number(anchor)?;
-        let shares = self.shares();
+        let shares = shares_of(&self.hypotheses);
         let sum: f64 = self
             .hypotheses
             .iter()
@@ -60,7 +61,7 @@ impl RangeTracker {
     pub fn own_bias(&self, anchor: &str) -> Result<Option<f64>, Error> {
         let number = self.number(anchor)?;
         let (mut probability, mut bias, mut square) = (0.0, 0.0, 0.0);
-        for (one, share) in self.hypotheses.iter().zip(self.shares()) {
+        for (one, share) in self.hypotheses.iter().zip(shares_of(&self.hypotheses)) {
             if one.apart == Some(number) {
                 let ([own], [[variance]]) = one.marginal(&[2 * self.known.axes + 2]);
                 probability += share;

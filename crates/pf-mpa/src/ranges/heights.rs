@@ -17,7 +17,7 @@ const APART: f64 = 6.0;
 /// Halvings of the step between two heights, about the best one.
 const HALVINGS: usize = 3;
 /// Ranges from which it is found, at most, and at least for each anchor.
-const RANGES: usize = 400;
+pub(super) const RANGES: usize = 400;
 const FEWEST: usize = 8;
 
 /// The constant height of the target, from its first ranges: each height that is tried is a tracker, and their evidences decide. `ranges`: time in

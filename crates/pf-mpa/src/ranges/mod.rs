@@ -22,7 +22,9 @@ mod estimate;
 mod fit;
 mod gaussian;
 mod heights;
+mod line;
 mod mirror;
+mod mistakes;
 mod moved;
 mod odds;
 mod rest;
@@ -33,6 +35,7 @@ mod settings;
 
 pub use estimate::RangeEstimate;
 pub use heights::height_of;
+pub use mistakes::{Mistake, mistake_of};
 pub use settings::{Height, RangeSettings};
 
 use crate::Error;
@@ -352,10 +355,6 @@ impl RangeTracker {
             add_mirrored(known, next);
         }
         Ok(taken)
-    }
-
-    fn shares(&self) -> Vec<f64> {
-        shares_of(&self.hypotheses)
     }
 
     fn estimate(&self, lost: bool) -> Option<RangeEstimate> {

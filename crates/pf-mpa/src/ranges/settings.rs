@@ -1,6 +1,6 @@
 //! Settings of the range tracker.
 
-use super::mirror::Line;
+use super::line::Line;
 use crate::Error;
 use fewbits_numerics::error::{finite, non_negative, positive, refuse, within};
 use nalgebra::Vector3;

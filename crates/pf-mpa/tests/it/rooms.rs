@@ -3,7 +3,7 @@
 use fewbits_core::Dynamics;
 use fewbits_models::ContinuousLinear;
 use fewbits_monte_carlo::Stream;
-use fewbits_pf_mpa::{RangeSettings, RangeTracker, Travel, height_of};
+use fewbits_pf_mpa::{Mistake, RangeSettings, RangeTracker, Travel, height_of, mistake_of};
 use nalgebra::{Vector3, Vector4};
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -450,6 +450,38 @@ fn rounded_ranges_at_rest_tell_no_height() {
         .map(|k| (0.25 * k as f64, anchors[k % 5].0.as_str(), rounded(k)))
         .collect();
     assert_eq!(height_of(&anchors, RangeSettings::default(), &ranges).unwrap(), None);
+}
+
+/// Ranges of the hall that a table has wrong are explained by what is wrong, and right ones, or one long anchor, by nothing.
+#[test]
+fn mistakes_of_tables_are_found() {
+    let anchors = hall();
+    let mut rng = Stream::new(23).named("mistakes").rng();
+    let found =
+        |anchors: &[(String, Vector3<f64>)], change: &dyn Fn(&str, f64) -> f64, noise: &mut dyn FnMut() -> f64| {
+            let names: Vec<String> = (0..5).map(|i| format!("h{i}")).collect();
+            let place = |name: &str| hall().into_iter().find(|(known, _)| known == name).unwrap().1;
+            let ranges: Vec<(f64, &str, f64)> = (0..300)
+                .map(|k| {
+                    let (time, name) = (0.1 * k as f64, names[k % 5].as_str());
+                    let truth = Vector3::new(6.0 + 3.0 * (0.2 * time).sin(), 5.0 + 2.5 * (0.15 * time).cos(), 0.0);
+                    (time, name, change(name, (truth - place(name)).norm() + 0.1 + 0.05 * noise()))
+                })
+                .collect();
+            mistake_of(anchors, RangeSettings::default(), &ranges).unwrap()
+        };
+    let mut noise = || rng.sample::<f64, _>(StandardNormal);
+    let as_they_are = |_: &str, range: f64| range;
+    assert_eq!(found(&anchors, &as_they_are, &mut noise), None);
+    assert_eq!(found(&anchors, &|name, range| if name == "h3" { range + 1.5 } else { range }, &mut noise), None);
+    let mut swapped = anchors.clone();
+    (swapped[1].1, swapped[2].1) = (anchors[2].1, anchors[1].1);
+    assert_eq!(found(&swapped, &as_they_are, &mut noise), Some(Mistake::Swapped("h1".to_owned(), "h2".to_owned())));
+    let mut turned = anchors.clone();
+    turned[1].1 = Vector3::new(1.0, 14.0, 0.0);
+    assert_eq!(found(&turned, &as_they_are, &mut noise), Some(Mistake::Axes("h1".to_owned())));
+    assert_eq!(found(&anchors, &|_, range| range * range, &mut noise), Some(Mistake::Squared));
+    assert_eq!(found(&anchors, &|_, range| range / 0.149_896_229, &mut noise), Some(Mistake::RoundTrip));
 }
 
 fn number(name: &str) -> Option<u64> {

@@ -1,0 +1,61 @@
+//! Mistakes of tables that `ranges` tells.
+
+use super::anchors::Anchor;
+use crate::numbers::short;
+use fewbits_pf_mpa::{Mistake, RangeSettings, mistake_of};
+
+/// Ranges from which a mistake is found.
+pub(super) const FIRST_RANGES: usize = 400;
+
+/// A range is a limit if one in so many of at least that many is it.
+const REPEATED: usize = 20;
+
+/// The largest of some ranges, with their anchors, if it stands there so often, and for two anchors, that it is a limit and no distance.
+pub(super) fn limit<A: PartialEq + Copy>(ranges: impl Iterator<Item = (A, f64)> + Clone) -> Option<f64> {
+    let largest = ranges
+        .clone()
+        .fold(f64::NEG_INFINITY, |largest, (_, range)| largest.max(range));
+    let those: Vec<A> = ranges
+        .clone()
+        .filter(|(_, range)| *range == largest)
+        .map(|(anchor, _)| anchor)
+        .collect();
+    let is_often = those.len() >= REPEATED && those.len() * REPEATED >= ranges.count();
+    (is_often && those.iter().any(|anchor| *anchor != those[0])).then_some(largest)
+}
+
+/// What to do about ranges that are limits.
+pub(super) fn limited(first: &[(f64, usize, f64)]) -> Option<String> {
+    let limit = short(limit(first.iter().map(|(_, anchor, range)| (*anchor, *range)))?);
+    Some(format!(
+        "many ranges are {limit}, and none is longer: if the radio says no more, they are limits, and --missing {limit} leaves them out"
+    ))
+}
+
+/// What to do about the mistake that explains the first ranges, if there is one.
+pub(super) fn mistake(anchors: &[Anchor], settings: RangeSettings, first: &[(f64, usize, f64)]) -> Option<String> {
+    let name = |anchor: usize| anchors.get(anchor).map(|(name, _)| name.as_str());
+    let ranges: Vec<(f64, &str, f64)> = first
+        .iter()
+        .filter_map(|(time, anchor, range)| Some((*time, name(*anchor)?, *range)))
+        .collect();
+    let found = mistake_of(anchors, settings, &ranges).ok()??;
+    let what = match found {
+        Mistake::Swapped(one, other) => {
+            format!("anchors {one} and {other} had each other's place: exchange their names in the table of anchors")
+        }
+        Mistake::Axes(anchor) => {
+            format!("x and y of anchor {anchor} stood for each other: exchange them in the table of anchors")
+        }
+        Mistake::Squared => "they were squares of distances: give the roots".to_owned(),
+        Mistake::Flight => {
+            "they were times of flight in nanoseconds and places in metres: multiply them by 0.299792458".to_owned()
+        }
+        Mistake::RoundTrip => {
+            "they were times there and back in nanoseconds and places in metres: multiply them by 0.149896229"
+                .to_owned()
+        }
+        _ => return None,
+    };
+    Some(format!("the first ranges are as if {what}"))
+}

@@ -1,0 +1,124 @@
+//! Mistakes of tables that explain ranges which contradict each other.
+
+use super::heights::RANGES;
+use super::{RangeSettings, RangeTracker, Travel};
+use crate::Error;
+use nalgebra::Vector3;
+
+/// A mistake must explain the ranges better than other mistakes, and than the tables as they are, by so many nats.
+const BETTER: f64 = 30.0;
+/// Of so many rows one may be doubtful.
+const SELDOM: usize = 20;
+/// Metres that light goes in a nanosecond.
+const LIGHT: f64 = 0.299_792_458;
+
+/// What may be wrong with a table of ranges or of anchors.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Mistake {
+    /// Two anchors have each other's place.
+    Swapped(String, String),
+    /// Two coordinates of an anchor stand for each other: x is y.
+    Axes(String),
+    /// Ranges are squares of distances.
+    Squared,
+    /// Ranges are times of flight in nanoseconds, places are in metres.
+    Flight,
+    /// The same for times to an anchor and back.
+    RoundTrip,
+}
+
+/// What one tracker says of some ranges.
+struct Trial {
+    /// `ln` of their probability density; `None` if the track is lost.
+    log_evidence: Option<f64>,
+    /// Whether few rows are doubtful, no anchor contradicts the others, and none has a bias of its own.
+    fits: bool,
+}
+
+fn trial(
+    anchors: &[(String, Vector3<f64>)],
+    settings: RangeSettings,
+    ranges: &[(f64, &str, f64)],
+) -> Result<Trial, Error> {
+    let mut tracker = RangeTracker::new(anchors.iter().cloned(), Travel::Full, settings)?;
+    let mut doubtful = 0;
+    for (time, anchor, range) in ranges {
+        let found = tracker.push(*time, anchor, *range)?;
+        if found.as_ref().is_some_and(|found| found.lost) {
+            return Ok(Trial {
+                log_evidence: None,
+                fits: false,
+            });
+        }
+        doubtful += usize::from(found.is_some_and(|found| found.is_doubtful));
+    }
+    let mut fits = SELDOM * doubtful <= ranges.len();
+    for (name, _) in anchors {
+        fits &= tracker.works(name)? > 0.5 && tracker.own_bias(name)?.is_none();
+    }
+    Ok(Trial {
+        log_evidence: tracker.log_evidence(),
+        fits,
+    })
+}
+
+/// The mistake that explains the first 400 ranges: each that is tried is a tracker, and their evidences decide.
+/// `ranges`: time in seconds, anchor and range. `None` if the tables explain the ranges as they are, or no mistake does much better than all others.
+///
+/// # Errors
+/// As [`RangeTracker::new`] and [`RangeTracker::push`].
+pub fn mistake_of(
+    anchors: &[(String, Vector3<f64>)],
+    settings: RangeSettings,
+    ranges: &[(f64, &str, f64)],
+) -> Result<Option<Mistake>, Error> {
+    let ranges = &ranges[..ranges.len().min(RANGES)];
+    let as_it_is = trial(anchors, settings, ranges)?;
+    if as_it_is.fits {
+        return Ok(None);
+    }
+    let mut tried: Vec<(f64, Mistake)> = Vec::new();
+    let mut fit = |anchors: &[(String, Vector3<f64>)], ranges: &[(f64, &str, f64)], slopes: f64, mistake: Mistake| {
+        let found = trial(anchors, settings, ranges)?;
+        tried.extend(
+            found
+                .log_evidence
+                .filter(|_| found.fits)
+                .map(|found| (found + slopes, mistake)),
+        );
+        Ok::<(), Error>(())
+    };
+    for (i, (name, place)) in anchors.iter().enumerate() {
+        let mut others = anchors.to_vec();
+        (others[i].1.x, others[i].1.y) = (place.y, place.x);
+        if place.x != place.y {
+            fit(&others, ranges, 0.0, Mistake::Axes(name.clone()))?;
+        }
+        for (j, (other, at)) in anchors.iter().enumerate().skip(i + 1) {
+            let mut others = anchors.to_vec();
+            (others[i].1, others[j].1) = (*at, *place);
+            fit(&others, ranges, 0.0, Mistake::Swapped(name.clone(), other.clone()))?;
+        }
+    }
+    let is_positive = ranges.iter().all(|(_, _, range)| *range > 0.0);
+    if is_positive && !settings.unknown_clock {
+        let mut change = |mistake: Mistake, map: &dyn Fn(f64) -> f64, slope: &dyn Fn(f64) -> f64| {
+            let changed: Vec<(f64, &str, f64)> = ranges
+                .iter()
+                .map(|(time, name, range)| (*time, *name, map(*range)))
+                .collect();
+            // The density of a range is that of what it is changed to, times the slope.
+            let slopes = ranges.iter().map(|(_, _, range)| slope(*range).ln()).sum();
+            fit(anchors, &changed, slopes, mistake)
+        };
+        change(Mistake::Squared, &|range| range.sqrt(), &|range| 0.5 / range.sqrt())?;
+        change(Mistake::Flight, &|range| LIGHT * range, &|_| LIGHT)?;
+        change(Mistake::RoundTrip, &|range| 0.5 * LIGHT * range, &|_| 0.5 * LIGHT)?;
+    }
+    tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let second = tried.get(1).map_or(f64::NEG_INFINITY, |one| one.0);
+    let second = second.max(as_it_is.log_evidence.unwrap_or(f64::NEG_INFINITY));
+    let best = tried.into_iter().next().filter(|(best, _)| *best > second + BETTER);
+    Ok(best.map(|(_, mistake)| mistake))
+}
