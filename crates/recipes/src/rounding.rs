@@ -95,7 +95,9 @@ mod tests {
     /// Defect: all numbers below a millionth were multiples of one, and rounded to that.
     #[test]
     fn steps_do_not_depend_on_the_unit() {
-        let rounded: Vec<f64> = (0..200).map(|k| (3000.0 + 40.0 * (f64::from(k) * 0.37).sin()).round()).collect();
+        let rounded: Vec<f64> = (0..200)
+            .map(|k| (3000.0 + 40.0 * (f64::from(k) * 0.37).sin()).round())
+            .collect();
         for digits in [-9, -3, 0, 2, 5, 9, 15, 30] {
             let scale = 10_f64.powi(-digits);
             let values: Vec<f64> = rounded.iter().map(|value| value * scale).collect();

@@ -1,8 +1,8 @@
 //! Mistakes of tables that `ranges` tells.
 
-use super::anchors::Anchor;
 use crate::numbers::short;
 use fewbits_pf_mpa::{Mistake, RangeSettings, mistake_of};
+use nalgebra::Vector3;
 
 /// Ranges from which a mistake is found.
 pub(super) const FIRST_RANGES: usize = 400;
@@ -33,7 +33,11 @@ pub(super) fn limited(first: &[(f64, usize, f64)]) -> Option<String> {
 }
 
 /// What to do about the mistake that explains the first ranges, if there is one.
-pub(super) fn mistake(anchors: &[Anchor], settings: RangeSettings, first: &[(f64, usize, f64)]) -> Option<String> {
+pub(super) fn mistake(
+    anchors: &[(String, Vector3<f64>)],
+    settings: RangeSettings,
+    first: &[(f64, usize, f64)],
+) -> Option<String> {
     let name = |anchor: usize| anchors.get(anchor).map(|(name, _)| name.as_str());
     let ranges: Vec<(f64, &str, f64)> = first
         .iter()
