@@ -7,7 +7,7 @@ use super::world::World;
 use crate::arguments::Model;
 use crate::error::Failure;
 use crate::report::Report;
-use fewbits_core::{BitString, Gaussian, Link, Message, NumberFormat, Observation, OnAxes, SensorNode};
+use fewbits_core::{BitString, Gaussian, Link, Message, NumberFormat, Observation, OnAxes, SensorNode, circle};
 use fewbits_filters::centre::{
     Failures, FalseAlarms, FusionCentre, NoiseLearning, ReportTest, Reporting, SensorState, Slot,
 };
@@ -153,11 +153,7 @@ fn moments<const D: usize>(belief: &Gaussian<D>, zero: f64) -> Vec<(f64, f64)> {
 /// Of angles that differ by whole periods, the one nearest to the prediction. Other values keep every bit: one at a detection limit is no
 /// longer at it after rounding.
 fn nearest(cell: f64, expected: f64, period: Option<f64>) -> f64 {
-    match period {
-        None => cell,
-        // An equal cell stays an equal value.
-        Some(period) => cell + period * ((expected - cell) / period).round(),
-    }
+    period.map_or(cell, |period| circle::nearest(cell, expected, period))
 }
 
 impl<const D: usize, F: StateFilter<D>> Centre<D, F> {

@@ -36,7 +36,7 @@ pub(super) fn height_found(
             }
         }
     }
-    // Limits are no distances: and would tell of a height that is not there.
+    // Limits are no distances: they would tell a height that is not there.
     if let Some(limit) = limit(ranges.iter().map(|(_, anchor, range)| (*anchor, *range))) {
         ranges.retain(|(_, _, range)| *range < limit);
     }

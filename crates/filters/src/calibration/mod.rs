@@ -21,6 +21,7 @@ pub use reading::Reading;
 pub use search::Number;
 
 use crate::{Error, assumed_density};
+use fewbits_core::circle::nearest;
 use fewbits_core::{Evolution, Gaussian, GaussianDynamics};
 use fewbits_numerics::error::{finite, refuse};
 use nalgebra::SMatrix;
@@ -69,7 +70,7 @@ pub struct Level<'a, W, const D: usize> {
 
 /// The difference of two angles, at most half a period in size.
 pub fn wrapped(difference: f64, period: Option<f64>) -> f64 {
-    period.map_or(difference, |period| difference - period * (difference / period).round())
+    period.map_or(difference, |period| nearest(difference, 0.0, period))
 }
 
 impl<W, E, const D: usize> Level<'_, W, D>

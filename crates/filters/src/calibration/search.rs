@@ -90,8 +90,8 @@ impl<L: Fn(f64, &[f64]) -> f64> Search<'_, L> {
     }
 
     /// Replaces a number by the root of the mean of its square under its likelihood, the other numbers held, all numbers being equally likely before
-    /// (not their logarithms): what may as well be smaller or larger makes bands too narrow more than too wide. Where the likelihood is as high far below, it says nothing but an upper end, and the largest number
-    /// that is not improbable is taken.
+    /// (not their logarithms): what may as well be smaller or larger makes bands too narrow more than too wide. Where the likelihood is as high
+    /// far below, it says nothing but an upper end, and the largest number that is not improbable is taken.
     pub(super) fn settle(&mut self, axis: usize) {
         let moved = |by: f64| {
             let mut other = self.shifts.clone();

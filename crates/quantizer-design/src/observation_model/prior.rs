@@ -163,8 +163,8 @@ impl Prior {
     }
 
     /// The smoothed density of a sample: a normal density at every value, of a bandwidth that decreases with the number of values
-    /// (Silverman's, or the likeliest of narrower ones: two modes that are far apart need a quarter of it). The centres are moved towards the mean so that mean and variance are the sample's. [`Prior::sample_fit`](Self::sample_fit)
-    /// gives the errors.
+    /// (Silverman's, or the likeliest of narrower ones: two modes that are far apart need a quarter of it). The centres are moved towards the
+    /// mean so that mean and variance are the sample's. [`Prior::sample_fit`](Self::sample_fit) gives the errors.
     ///
     /// # Errors
     /// If there are fewer than five values, one is not finite, or all are equal.
