@@ -25,7 +25,8 @@ type Parts<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyBytes>);
 /// `start` has the members, shape (d, n), up to six coordinates. `move(x, dt, rng)` draws the next states: it changes `x` in place, or returns
 /// an array of its shape; `rng` is a `Generator`. `measure(x)` returns the noise-free measurement of each member; a dictionary has one such
 /// function per column. `noise` is the deviation of the measurements, and `send` what their sensors send: "value", "bit" (is the sample at or
-/// above the prediction?) or "word:2" to "word:4"; a dictionary has them by column. After each time update deviations from the mean are
+/// above the prediction?) or "word:2" to "word:4"; a dictionary has them by column. `period` is that of measurements on a circle, as 360 of
+/// bearings in degrees: they are compared the shorter way around. After each time update deviations from the mean are
 /// multiplied by `inflation`, at least 1: `1 + 1 / (2 n)` makes up for the sampling error of the variance. No observations are perturbed: an
 /// update gives the members the mean and the covariance of the exact update of their own. A step that fails leaves the members as they were.
 ///
@@ -53,7 +54,7 @@ pub(crate) struct EnsembleFilter {
 #[pymethods]
 impl EnsembleFilter {
     #[new]
-    #[pyo3(signature = (start, r#move, measure, *, noise, seed, send=None, inflation=1.0))]
+    #[pyo3(signature = (start, r#move, measure, *, noise, seed, send=None, inflation=1.0, period=None))]
     #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python<'_>,
@@ -64,6 +65,7 @@ impl EnsembleFilter {
         #[pyo3(from_py_with = named)] seed: u64,
         send: Option<&Bound<'_, PyAny>>,
         #[pyo3(from_py_with = named)] inflation: f64,
+        period: Option<&Bound<'_, PyAny>>,
     ) -> Outcome<Self> {
         let (d, n, numbers) = matrix("start", start)?;
         if numbers.is_empty() || d > 6 {
@@ -82,7 +84,7 @@ impl EnsembleFilter {
         Ok(Self {
             members: numbers.chunks_exact(n).map(<[f64]>::to_vec).collect(),
             transition: r#move.clone().unbind(),
-            sensors: sensors(&measures.names(), noise, send)?,
+            sensors: sensors(&measures.names(), noise, send, period)?,
             measures,
             inflation,
             generator: Py::new(py, Generator::of(seed))?,
@@ -213,8 +215,9 @@ impl EnsembleFilter {
                 return refused("observation", shown(&sample), "a number");
             };
             let found = function.bind(py).call1((of_columns(py, next.clone())?,))?;
-            let measured = returned("measure", "member", &found, n)?.as_array().to_vec();
+            let mut measured = returned("measure", "member", &found, n)?.as_array().to_vec();
             let sensor = &self.sensors[at];
+            sensor.unwrap(&mut measured);
             let (log, sent) = with_dimension!(d, D => updated::<D>(&mut next, &measured, sensor, sample))?;
             (log_likelihood, bits) = (log_likelihood + log, bits + sent);
         }

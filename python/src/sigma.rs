@@ -9,6 +9,7 @@ use crate::rows::Rows;
 use crate::seat::Sends;
 use crate::stored::{self, Reduced};
 use crate::table::Table;
+use fewbits_core::circle::nearest;
 use fewbits_core::factor::{Scalar, Value};
 use fewbits_core::{Gaussian, Link, Observation, Scheme};
 use fewbits_dymbo::{InnovationWord, Prediction, SignBit};
@@ -25,6 +26,9 @@ use serde::{Deserialize, Serialize};
 pub(crate) struct Sensor {
     variance: f64,
     send: Sends,
+    /// Measurements that differ by whole periods are equal.
+    #[serde(default)]
+    period: Option<f64>,
 }
 
 impl Sensor {
@@ -35,15 +39,24 @@ impl Sensor {
             Sends::Silent(_) => false,
             _ => true,
         };
-        sends && self.variance > 0.0 && self.variance.is_finite()
+        let is_size = |number: f64| number > 0.0 && number.is_finite();
+        sends && is_size(self.variance) && self.period.is_none_or(is_size)
+    }
+
+    /// Brings measurements on a circle next to the first of them.
+    pub(crate) fn unwrap(&self, measured: &mut [f64]) {
+        if let (Some(period), Some(first)) = (self.period, measured.first().copied()) {
+            measured.iter_mut().for_each(|z| *z = nearest(*z, first, period));
+        }
     }
 }
 
-/// The sensors of these columns: their noises, and what they send.
+/// The sensors of these columns: their noises, what they send, and periods of those that measure angles.
 pub(crate) fn sensors(
     names: &[Option<&str>],
     noise: &Bound<'_, PyAny>,
     send: Option<&Bound<'_, PyAny>>,
+    period: Option<&Bound<'_, PyAny>>,
 ) -> Outcome<Vec<Sensor>> {
     let variances = by_column("noise", noise, names, |given| match given.extract::<f64>() {
         Ok(noise) if noise > 0.0 && noise.is_finite() && noise * noise > 0.0 => Ok(noise * noise),
@@ -60,8 +73,17 @@ pub(crate) fn sensors(
             })?
         }
     };
-    let sensors = variances.into_iter().zip(sends);
-    Ok(sensors.map(|(variance, send)| Sensor { variance, send }).collect())
+    let periods = match period {
+        None => vec![None; names.len()],
+        Some(period) => by_column("period", period, names, |given| match given.extract::<Option<f64>>() {
+            Ok(None) => Ok(None),
+            Ok(Some(period)) if period > 0.0 && period.is_finite() => Ok(Some(period)),
+            _ => refused("period", shown(given), "a finite number above 0, or None for a number on the line"),
+        })?,
+    };
+    let sensors = variances.into_iter().zip(sends).zip(periods);
+    let sensor = |((variance, send), period)| Sensor { variance, send, period };
+    Ok(sensors.map(sensor).collect())
 }
 
 /// A filter of one dimension with its belief.
@@ -152,6 +174,9 @@ pub(crate) fn said(sensor: &Sensor, sample: f64, predicted: &Gaussian<1>) -> Out
         let report = scheme.encode(&mut rng, &mut (), &Vector1::new(sample), feedback)?;
         Ok(scheme.factor(feedback, &Observation::from(report), &Link::PERFECT)?)
     }
+    let sample = sensor
+        .period
+        .map_or(sample, |period| nearest(sample, predicted.mean()[0], period));
     Ok(match sensor.send {
         Sends::Bit => (through(&SignBit::new(sensor.variance)?, &predicted.mean()[0], sample)?, 1),
         Sends::Word(bits) => {
@@ -169,7 +194,8 @@ pub(crate) fn said(sensor: &Sensor, sample: f64, predicted: &Gaussian<1>) -> Out
 /// measurements of the points; a dictionary has one such function per column. In `x` each row is a coordinate and each column a point.
 /// `process` is the covariance of the process noise after a second, which grows with time, or a function of `dt` that returns it. `noise` is
 /// the deviation of the measurements, and `send` what their sensors send: "value", "bit" (is the sample at or above the prediction?) or
-/// "word:2" to "word:4"; a dictionary has them by column. `rule` is "unscented", whose middle point has the weight `kappa / (d + kappa)`
+/// "word:2" to "word:4"; a dictionary has them by column. `period` is that of measurements on a circle, as 360 of bearings in degrees: they are
+/// compared the shorter way around. `rule` is "unscented", whose middle point has the weight `kappa / (d + kappa)`
 /// (3 - d if left out, at least 0), or "cubature". The belief at the start has `mean` and `deviation` or `covariance`.
 ///
 /// >>> import numpy as np, fewbits as fb
@@ -216,7 +242,7 @@ enum Process {
 #[pymethods]
 impl SigmaPointFilter {
     #[new]
-    #[pyo3(signature = (r#move, measure, *, process, noise, mean, deviation=None, covariance=None, rule="unscented", kappa=None, send=None))]
+    #[pyo3(signature = (r#move, measure, *, process, noise, mean, deviation=None, covariance=None, rule="unscented", kappa=None, send=None, period=None))]
     #[allow(clippy::too_many_arguments)]
     fn new(
         r#move: &Bound<'_, PyAny>,
@@ -229,6 +255,7 @@ impl SigmaPointFilter {
         #[pyo3(from_py_with = named)] rule: &str,
         #[pyo3(from_py_with = named)] kappa: Option<f64>,
         send: Option<&Bound<'_, PyAny>>,
+        period: Option<&Bound<'_, PyAny>>,
     ) -> Outcome<Self> {
         if !r#move.is_callable() {
             return refused("move", r#move.get_type().name()?, "a function of the points and seconds");
@@ -237,7 +264,7 @@ impl SigmaPointFilter {
         let dimension = mean.len();
         let covariance = crate::model::covariance(deviation, covariance, dimension)?;
         let measures = Likelihoods::parsed("measure", measure)?;
-        let sensors = sensors(&measures.names(), noise, send)?;
+        let sensors = sensors(&measures.names(), noise, send, period)?;
         let process = if process.is_callable() {
             Process::Function(process.clone().unbind())
         } else {
@@ -408,6 +435,7 @@ impl SigmaPointFilter {
                     .iter_mut()
                     .zip(found.as_array())
                     .for_each(|(z, found)| *z = *found);
+                self.sensors[at].unwrap(measured);
                 Ok(())
             };
             let (log, sent) = next.update(&mut measure, &self.sensors[at], sample)?;

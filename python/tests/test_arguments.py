@@ -116,16 +116,16 @@ CALLS = {
     "EnsembleFilter": (
         lambda *a, **k: fb.EnsembleFilter(*a, **{"noise": 1.0, "seed": 1, **k}),
         ["start", "move", "measure"],
-        ["noise", "seed", "send", "inflation"],
+        ["noise", "seed", "send", "inflation", "period"],
     ),
     "EnsembleFilter.step": (lambda *a, **k: ensemble().step(*a, **k), ["observation"], ["dt"]),
     "EnsembleFilter.run": (lambda *a, **k: ensemble().run(*a, **{"time": "t", **k}), ["table"], ["time"]),
     "SigmaPointFilter": (
         lambda *a, **k: fb.SigmaPointFilter(*a, **{"process": np.eye(2), "noise": 1.0, "mean": [0.0, 0.0], "deviation": [1.0, 1.0], **k}),
         ["move", "measure"],
-        ["process", "noise", "mean", "deviation", "covariance", "rule", "kappa", "send"],
+        ["process", "noise", "mean", "deviation", "covariance", "rule", "kappa", "send", "period"],
     ),
-    "SigmaPointFilter's settings": (sigma, [], ["process", "noise", "mean", "deviation", "covariance", "rule", "kappa", "send"]),
+    "SigmaPointFilter's settings": (sigma, [], ["process", "noise", "mean", "deviation", "covariance", "rule", "kappa", "send", "period"]),
     "SigmaPointFilter.step": (lambda *a, **k: sigma().step(*a, **k), ["observation"], ["dt"]),
     "SigmaPointFilter.run": (lambda *a, **k: sigma().run(*a, **{"time": "t", **k}), ["table"], ["time"]),
     "fit": (

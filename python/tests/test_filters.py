@@ -110,3 +110,50 @@ def test_a_lag_of_all_rows_is_the_smoother_of_all():
     for bad in (-1.0, np.nan, np.inf, "all"):
         with pytest.raises(fb.ArgumentError, match="smooth"):
             run(bad)
+
+
+@pytest.mark.parametrize("send", ["value", "bit", "word:3"])
+@pytest.mark.parametrize("kind", ["points", "ensemble"])
+def test_bearings_that_cross_north_are_those_of_a_turned_world(kind, send):
+    """The target passes the sensor, so that bearings cross from 360 to 0 degrees; in a world that is turned by half a turn they do not."""
+    t = np.arange(60) * 1.0
+    x, y = -3.0 + 0.1 * t, np.full(60, 4.0)
+    noise = 0.5 * np.random.default_rng(8).standard_normal(60)
+
+    def estimates(turn):
+        def bearing(s):
+            return (np.degrees(np.arctan2(s[0], 4.0)) + turn) % 360.0
+
+        seen = (np.degrees(np.arctan2(x, y)) + noise + turn) % 360.0
+        settings = {"noise": 0.5, "send": send, "period": 360.0}
+        if kind == "points":
+
+            def move(s, dt):
+                s[0] += dt * s[1]
+
+            made = fb.SigmaPointFilter(move, bearing, process=1e-4 * np.eye(2), mean=[-3.0, 0.0], deviation=[0.5, 0.2], **settings)
+        else:
+
+            def drift(s, dt, rng):
+                s[0] += dt * s[1]
+                rng.add_normal(s[0], 0.01)
+                rng.add_normal(s[1], 0.01)
+
+            start = np.random.default_rng(2).standard_normal((2, 400)) * [[0.5], [0.2]] + [[-3.0], [0.0]]
+            made = fb.EnsembleFilter(start, drift, bearing, seed=3, **settings)
+        found = []
+        for z in seen:
+            made.step(z)
+            found.append(made.mean[0])
+        return np.array(found)
+
+    ahead, behind = estimates(0.0), estimates(180.0)
+    assert np.allclose(ahead, behind, atol=1e-6)
+    assert np.abs(ahead - x)[20:].max() < (0.2 if send == "value" else 0.6)
+
+
+def test_a_period_is_above_zero():
+    with pytest.raises(fb.Error, match="period"):
+        ensemble(np.zeros((1, 3)), period=0.0)
+    with pytest.raises(fb.Error, match="period"):
+        ensemble(np.zeros((1, 3)), {"a": lambda x: x[0]}, noise={"a": 1.0}, period={"b": 360.0})
