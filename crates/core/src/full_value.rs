@@ -64,6 +64,7 @@ impl Scheme<1> for FullValue {
         Ok(Some(self.format.rounded(finite("measurement", measurement[0])?)?))
     }
 
+    #[inline]
     fn factor(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<Scalar, Error> {
         let Observation::Received(value) = observation else {
             return Ok(Constant::of_delivery(observation, link).into());

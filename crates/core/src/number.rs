@@ -124,6 +124,7 @@ impl NumberFormat {
     ///
     /// # Errors
     /// If `value` is not finite, or rounds to infinity in single precision.
+    #[inline]
     pub fn rounded(&self, value: f64) -> Result<f64, ArgumentError> {
         finite("value", value)?;
         match self {
@@ -138,6 +139,7 @@ impl NumberFormat {
     ///
     /// # Errors
     /// If the format does not hold `value` exactly; see [`NumberFormat::rounded`].
+    #[inline]
     pub fn write(&self, value: f64, writer: &mut BitWriter) -> Result<(), CodecError> {
         if self.rounded(value) != Ok(value) {
             return Err(invalid(value, "a finite number that the format holds exactly"));
@@ -153,6 +155,7 @@ impl NumberFormat {
     ///
     /// # Errors
     /// If bits are missing or are those of an infinity or NaN.
+    #[inline]
     pub fn read(&self, reader: &mut BitReader<'_>) -> Result<f64, CodecError> {
         let word = reader.read(self.bits())?;
         let value = match self {

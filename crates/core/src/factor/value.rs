@@ -145,6 +145,7 @@ impl<const M: usize> Factor<M> for Value<M> {
 
     /// `S = V + R`, gain `K = V S^-1`: mean `mu + K (z - mu)`, covariance `(I - K) V (I - K)' + K R K'`, evidence
     /// `N(z; mu, S)`.
+    #[inline]
     fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
         let (spread, noise) = (prior.covariance(), self.noise_covariance());
         let factor = Cholesky::new(spread + noise).ok_or(Error::NotANumber {
