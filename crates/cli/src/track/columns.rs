@@ -226,7 +226,7 @@ impl Roles {
             .find(is_one)
             .filter(|_| table.names.len() > 1)?;
         let name = crate::say::name(name);
-        let dilution = if name.ends_with("dop") {
+        let dilution = if name.to_lowercase().ends_with("dop") {
             "; a column of standard deviations, the dilution times the error of a range, is an --accuracy-column"
         } else {
             ""

@@ -123,6 +123,9 @@ fn columns_that_measure_no_common_level_are_refused() {
     let problem = |options: &[&str]| refused(folder.path(), &[&["track", "-"], options].concat(), table.as_bytes());
     assert!(problem(&[]).contains("lat and lon do not measure one level"));
     assert!(problem(&["--without", "lon,lat"]).contains("--without hdop"));
+    let capitals = table.replacen("hdop", "HDOP", 1);
+    let words = ["track", "-", "--without", "lon,lat"];
+    assert!(refused(folder.path(), &words, capitals.as_bytes()).contains("--accuracy-column"));
     let (with, _) = tracked(&table, &["--columns", "east"]);
     assert_eq!(with, tracked(&table, &["--without", "lon,lat,hdop"]).0);
     tracked(&table, &["--columns", "lat,lon"]);

@@ -1,7 +1,7 @@
 //! The other side of anchors that are nearly on a line.
 //!
-//! Such anchors tell the two sides of their line apart little, and a filter on one side does not follow a target that crosses: beside a place near the line, its
-//! mirror image is carried until the ranges decide.
+//! Such anchors tell the two sides of their line apart little, and a filter on one side does not follow a target that crosses: beside a place near
+//! the line, its mirror image is carried until the ranges decide.
 
 use super::bank::Hypothesis;
 use super::odds::shares_of;
@@ -21,11 +21,8 @@ pub(super) fn add_mirrored(known: &Known, hypotheses: &mut Vec<Hypothesis>) {
         return;
     };
     let mut added: Vec<Hypothesis> = Vec::new();
-    for i in (0..hypotheses.len()).filter({
-        let shares = shares_of(hypotheses);
-        move |i| shares[*i] > PROBABLE
-    }) {
-        let one = &hypotheses[i];
+    let shares = shares_of(hypotheses);
+    for (one, _) in hypotheses.iter().zip(shares).filter(|(_, share)| *share > PROBABLE) {
         let (mean, covariance) = one.marginal(&[0, 1]);
         let covariance = Matrix2::from_fn(|a, b| covariance[a][b]);
         let (off, variance) = (line.offset(&mean), line.normal.dot(&(covariance * line.normal)));
