@@ -49,6 +49,7 @@ mod plain;
 mod priors;
 mod rows;
 mod start;
+mod stored;
 mod tables;
 mod vectors;
 

@@ -1,4 +1,4 @@
-//! Codes indices by tables of symbols: several times as fast as `counts.rs` for blocks of many rows.
+//! Reads indices that were coded by tables of symbols which learn. Writers store tables (module `stored`), which are read twice as fast.
 //!
 //! The first [`WARM`] differences are coded by counts. All further ones are symbols (module `alphabet`) under tables that both ends make
 //! anew from the symbols so far, so that no table is stored. Four lanes code four stretches of rows at a time, each with a state of its
@@ -27,15 +27,12 @@
 //! 0. It begins with `p` words that are zero, has no new tables, reads words only while there are any, and ends with the state 1.
 
 mod alphabet;
-mod order;
-mod plan;
+pub(crate) mod order;
 mod symbols;
-#[cfg(test)]
-mod tests;
-mod words;
+pub(crate) mod words;
 
-use crate::arithmetic::{Coder, Reader, Writer};
-use crate::bytes::{Bytes, push_varint};
+use crate::arithmetic::{Coder, Reader};
+use crate::bytes::Bytes;
 use crate::counts::Counts;
 use crate::error::Damaged;
 use crate::indices::code_first;
@@ -43,9 +40,8 @@ use crate::rows::code_all;
 use crate::vectors::vectorised_narrow;
 use alphabet::Context;
 use order::Order;
-pub(crate) use plan::{Plan, pco_order, sample_bits};
 use symbols::Tables;
-use words::{LANES, LOW, Steps, Words};
+use words::{LANES, LOW, Words};
 
 /// Number of differences that are coded by counts.
 const WARM: usize = 256;
@@ -55,10 +51,8 @@ const STRETCH: usize = 512;
 const PERIOD: usize = 32;
 /// Rows for which memory is reserved in advance, for each word.
 const ROWS_OF_A_WORD: usize = 64;
-/// Steps of a row at most: two of symbols, four of a whole cell, two of a range, three of low bits.
-const MOST_STEPS: usize = 11;
 /// Smallest number of rows of a block that is coded by tables.
-pub(crate) const TABLES_ROWS: usize = 2048;
+const TABLES_ROWS: usize = 2048;
 const _: () = assert!(TABLES_ROWS > WARM + 1);
 /// Bits that a tail should take: more than the words of three lanes and the state of the first one hold.
 const TAIL_BITS: usize = 80;
@@ -88,71 +82,7 @@ fn stretches(rows: usize) -> impl Iterator<Item = usize> {
     std::iter::repeat_n(STRETCH, full).chain((rest > 0).then_some(rest))
 }
 
-/// A block's indices behind its head. There must be [`TABLES_ROWS`] at least.
-pub(crate) fn write(indices: &[i64], plan: &Plan, mut bytes: Vec<u8>) -> Result<Vec<u8>, Damaged> {
-    let Plan { order, low, .. } = *plan;
-    let mut writer = Writer::default();
-    code_first(&mut writer, indices.first().copied(), false)?;
-    let second = order == Order::Second;
-    writer.raw(u64::from(second), 1);
-    if let Order::Values { centre } = order {
-        writer.raw(u64::from(low + OF_VALUES), LOW_FIELD);
-        code_first(&mut writer, Some(centre), false)?;
-    } else {
-        writer.raw(u64::from(low), LOW_FIELD);
-    }
-    code_all(&mut writer, Counts::new(indices[0], second), Some(&indices[..=WARM]), WARM + 1, None)?;
-    let warm = writer.finish();
-    let all = order.differences(indices);
-    let (learned, rest) = all.split_at(WARM);
-    let tail = tail_rows(rest.len(), warm.len());
-    let (steps, tail_from) = vectorised_narrow(
-        #[inline(always)]
-        || match order {
-            Order::Values { .. } => steps::<true>(learned, rest, low, tail),
-            _ => steps::<false>(learned, rest, low, tail),
-        },
-    );
-    let (states, words, pads) = steps.encoded(tail_from);
-    let head = (words.len() as u64 % 4) << PAD_BITS | pads;
-    push_varint(&mut bytes, (warm.len() as u64) << HEAD_BITS | head);
-    bytes.extend_from_slice(&warm);
-    bytes.extend(states.iter().flat_map(|state| state.to_le_bytes()));
-    bytes.extend(words.iter().rev().flat_map(|word| word.to_le_bytes()));
-    Ok(bytes)
-}
-
-/// The steps of all rows in the order of a reader, and which is the first of the tail.
-#[inline(always)]
-fn steps<const OF_VALUES: bool>(learned: &[i64], rest: &[i64], low: u32, tail: usize) -> (Steps, usize) {
-    let mut tables = Tables::learned::<false, OF_VALUES>(learned, low);
-    let mut steps = Steps::new();
-    // Most rows are one step, or two with low bits.
-    steps.reserve(2 * rest.len());
-    let mut remaining = rest;
-    for length in stretches(rest.len() - tail) {
-        let mut lanes = [Context::<OF_VALUES>::START; LANES];
-        let (rows, others) = remaining.split_at(LANES * length);
-        remaining = others;
-        for from in (0..length).step_by(PERIOD) {
-            steps.reserve(LANES * PERIOD * MOST_STEPS);
-            for row in from..length.min(from + PERIOD) {
-                for (lane, context) in lanes.iter_mut().enumerate() {
-                    tables.write(context, rows[lane * length + row], low, |part| steps.push(lane, part));
-                }
-            }
-            tables.renew::<false>();
-        }
-    }
-    let (tail_from, mut context) = (steps.len(), Context::<OF_VALUES>::START);
-    steps.reserve(remaining.len() * MOST_STEPS);
-    for difference in remaining {
-        tables.write(&mut context, *difference, low, |part| steps.push(0, part));
-    }
-    (steps, tail_from)
-}
-
-/// The indices of a block of [`write`], without its head.
+/// The indices of a block without its head.
 pub(crate) fn read(bytes: &[u8], rows: usize) -> Result<Vec<i64>, Damaged> {
     if rows < TABLES_ROWS {
         return Err(Damaged::new("block", format!("tables for {rows} rows"), "2048 rows or more"));
@@ -221,7 +151,7 @@ impl Head {
         // Memory for all rows at once where so few bytes may hold them: a damaged number of rows takes no more than its bytes.
         indices.reserve((rows - indices.len()).min(ROWS_OF_A_WORD * words.len()));
         let mut words = Words::new(words);
-        let mut tables = Tables::learned::<true, OF_VALUES>(&learned, self.low);
+        let mut tables = Tables::learned::<OF_VALUES>(&learned, self.low);
         let mut found = [0; LANES * STRETCH];
         let rest = rows - indices.len();
         for length in stretches(rest - self.tail) {
@@ -278,7 +208,7 @@ impl Head {
                 *c = tables.read::<LOW_BITS, OF_VALUES>(&mut c2, &mut x2, &mut own, self.low);
                 *d = tables.read::<LOW_BITS, OF_VALUES>(&mut c3, &mut x3, &mut own, self.low);
             }
-            tables.renew::<true>();
+            tables.renew();
         }
         (*states, *words) = ([x0, x1, x2, x3], own);
     }

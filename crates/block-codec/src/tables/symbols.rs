@@ -3,10 +3,9 @@
 use super::alphabet::{
     CONTEXTS, Context, ESCAPE, RANGE_BITS, RANGES, STATES, SYMBOL_BITS, SYMBOLS, WHOLE_BITS, ZERO, symbol,
 };
-use super::words::{Part, SLOTS, Step, Words, raw_steps};
-use crate::bytes::{unzigzag, zigzag};
+use super::words::{Part, SLOTS, Words};
+use crate::bytes::unzigzag;
 use crate::rows::LARGEST;
-use fewbits_node::elementary::log2;
 
 /// Weight of the frequencies of all contexts in each, in symbols.
 const COMMON: f32 = 24.0;
@@ -18,38 +17,6 @@ const GROWTH: u16 = 5;
 /// Number of symbols from which on counts are halved when a table is made.
 const MOST: u16 = 1024;
 
-/// Estimated bits of a row: each of these runs of differences is coded by the counts of all its other symbols.
-pub(super) fn estimated_bits<'a, const OF_VALUES: bool>(runs: impl Iterator<Item = &'a [i64]>, low: u32) -> f32 {
-    let (mut counts, mut all) = ([[0_u16; SYMBOLS]; STATES], [0_u16; SYMBOLS]);
-    let (mut rows, mut raw) = (0, 0);
-    for run in runs {
-        let mut context = Context::<OF_VALUES>::START;
-        for difference in run {
-            let cell = context.turned(*difference) >> low;
-            let (symbol, bits) = symbol(cell);
-            counts[context.index()][symbol] += 1;
-            all[symbol] += 1;
-            raw += low
-                + if symbol == ESCAPE {
-                    SYMBOL_BITS + WHOLE_BITS
-                } else {
-                    bits
-                };
-            context.follow(symbol, cell < 0);
-        }
-        rows += run.len();
-    }
-    let common = all.map(|count| COMMON * f32::from(count) / rows.max(1) as f32);
-    let mut sum = raw as f32;
-    for counts in &counts[..CONTEXTS] {
-        let other = counts.iter().sum::<u16>() as f32 + COMMON - 1.0;
-        for (count, common) in counts.iter().zip(common).filter(|(count, _)| **count > 0) {
-            sum += f32::from(*count) * log2(other / (f32::from(*count) - 1.0 + common));
-        }
-    }
-    sum / rows.max(1) as f32
-}
-
 /// Tables of all contexts.
 #[derive(Debug)]
 pub(super) struct Tables {
@@ -58,14 +25,14 @@ pub(super) struct Tables {
     sums: [u16; STATES],
     added: [u16; STATES],
     parts: [[Part; SYMBOLS]; STATES],
-    /// The symbol of each slot: only for reading.
+    /// The symbol of each slot.
     slots: [[u8; SLOTS + AT_ONCE]; STATES],
 }
 
 impl Tables {
-    /// Tables after these differences. Those of writers have no slots.
+    /// Tables after these differences.
     #[inline(always)]
-    pub(super) fn learned<const READS: bool, const OF_VALUES: bool>(differences: &[i64], low: u32) -> Box<Self> {
+    pub(super) fn learned<const OF_VALUES: bool>(differences: &[i64], low: u32) -> Box<Self> {
         let mut tables = Box::new(Self {
             counts: [[0; SYMBOLS]; STATES],
             sums: [0; STATES],
@@ -80,41 +47,11 @@ impl Tables {
             tables.counts[context.index()][symbol] += 1;
             context.follow(symbol, cell < 0);
         }
-        tables.renew_if::<READS>(|_, _| true);
+        tables.renew_if(|_, _| true);
         tables
     }
 
-    /// Writes a difference as one step or several.
-    #[inline(always)]
-    pub(super) fn write<const OF_VALUES: bool>(
-        &mut self,
-        context: &mut Context<OF_VALUES>,
-        difference: i64,
-        low: u32,
-        mut push: impl FnMut(Step),
-    ) {
-        let turned = context.turned(difference);
-        let cell = turned >> low;
-        let (symbol, bits) = symbol(cell);
-        let at = context.index();
-        let part = self.parts[at][symbol % SYMBOLS];
-        if symbol == ESCAPE || part.width() == 0 {
-            push(Step::Symbol(self.parts[at][ESCAPE]));
-            raw_steps(symbol as u64, SYMBOL_BITS, &mut push);
-            if symbol == ESCAPE {
-                raw_steps(zigzag(cell), WHOLE_BITS, &mut push);
-            }
-        } else {
-            push(Step::Symbol(part));
-        }
-        raw_steps(cell.unsigned_abs(), bits, &mut push);
-        raw_steps(turned as u64, low, &mut push);
-        self.counts[at][symbol % SYMBOLS] += 1;
-        self.added[at] += 1;
-        context.follow(symbol, cell < 0);
-    }
-
-    /// The difference that [`write`](Self::write) wrote.
+    /// The next difference.
     #[inline(always)]
     pub(super) fn read<const LOW_BITS: bool, const OF_VALUES: bool>(
         &mut self,
@@ -147,12 +84,12 @@ impl Tables {
 
     /// Makes those tables anew whose counts have grown enough.
     #[inline(always)]
-    pub(super) fn renew<const READS: bool>(&mut self) {
-        self.renew_if::<READS>(|sum, added| (added >= FEW) & (GROWTH * added >= sum + added));
+    pub(super) fn renew(&mut self) {
+        self.renew_if(|sum, added| (added >= FEW) & (GROWTH * added >= sum + added));
     }
 
     #[inline(always)]
-    fn renew_if<const READS: bool>(&mut self, is_due: impl Fn(u16, u16) -> bool) {
+    fn renew_if(&mut self, is_due: impl Fn(u16, u16) -> bool) {
         let mut due = [false; CONTEXTS];
         for ((due, sum), added) in due.iter_mut().zip(self.sums).zip(self.added) {
             *due = is_due(sum, added);
@@ -169,16 +106,16 @@ impl Tables {
         let has_ranges = all[RANGES..].iter().any(|count| *count > 0);
         for (at, _) in due.iter().enumerate().filter(|(_, due)| **due) {
             if has_ranges {
-                self.renew_one::<READS, SYMBOLS>(at, &common);
+                self.renew_one::<SYMBOLS>(at, &common);
             } else {
-                self.renew_one::<READS, RANGES>(at, &common);
+                self.renew_one::<RANGES>(at, &common);
             }
         }
     }
 
     /// Makes one table anew. `N`: all symbols from there on were never seen.
     #[inline(always)]
-    fn renew_one<const READS: bool, const N: usize>(&mut self, at: usize, common: &[i32; SYMBOLS]) {
+    fn renew_one<const N: usize>(&mut self, at: usize, common: &[i32; SYMBOLS]) {
         let widths = widths::<N>(&self.counts[at], common);
         let (parts, mut start) = (&mut self.parts[at], 0);
         for (part, width) in parts.iter_mut().zip(widths) {
@@ -186,9 +123,7 @@ impl Tables {
             start += width;
         }
         parts[N..].fill(Part::default());
-        if READS {
-            fill(&mut self.slots[at], &widths);
-        }
+        fill(&mut self.slots[at], &widths);
         let counts = &mut self.counts[at];
         if counts.iter().sum::<u16>() > MOST {
             counts.iter_mut().for_each(|count| *count /= 2);
