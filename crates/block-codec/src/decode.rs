@@ -6,7 +6,7 @@ use crate::grid::{DECIMALS, Grid, PHASES};
 use crate::head::{CIRCLE, Coding, Head, LINE, SAMPLES, SINGLE, STORED, TABLED, WRAPPED};
 use crate::indices::{from_pco_bytes, from_wrapped_pco, raw_samples, read_block};
 use crate::rows::Others;
-use crate::{Accuracy, BlockCodec, Error, check_rows, levels, stored, tables};
+use crate::{Accuracy, BlockCodec, Error, check_rows, learned, levels, stored};
 
 impl BlockCodec {
     /// The samples of a block of `rows` rows.
@@ -42,7 +42,7 @@ impl BlockCodec {
                     keys.into_iter().map(levels::sample_of_key).collect()
                 }
                 Coding::TabledLevels => {
-                    let keys = levels::read_tabled(rest, rows, tables::read)?;
+                    let keys = levels::read_tabled(rest, rows, learned::read)?;
                     keys.into_iter().map(levels::sample_of_key).collect()
                 }
                 Coding::StoredLevels => {
@@ -63,7 +63,7 @@ impl BlockCodec {
                 keys.into_iter().map(levels::index_of_key).collect()
             }
             Coding::TabledLevels => {
-                let keys = levels::read_tabled(rest, rows, tables::read)?;
+                let keys = levels::read_tabled(rest, rows, learned::read)?;
                 keys.into_iter().map(levels::index_of_key).collect()
             }
             Coding::StoredLevels => {
@@ -72,7 +72,7 @@ impl BlockCodec {
             }
             Coding::Wrapped => from_wrapped_pco::<i64>(rest, rows)?,
             Coding::Counts => read_block(rest, false, &grid, rows, None)?,
-            Coding::Tables => tables::read(rest, rows)?,
+            Coding::Tables => learned::read(rest, rows)?,
             Coding::Stored => stored::read(rest, rows)?,
             _ => from_pco_bytes::<i64>(rest, rows)?,
         };

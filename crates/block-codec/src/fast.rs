@@ -111,9 +111,7 @@ impl BlockCodec {
         };
         let counted = || write_block(false, grid, &indices, &exceptions, None);
         Ok(Some(match choice {
-            Choice::Symbols(plan) if is_tabled => {
-                stored::write(&indices, &plan, head(Coding::Stored))?
-            }
+            Choice::Symbols(plan) if is_tabled => stored::write(&indices, &plan, head(Coding::Stored))?,
             Choice::Symbols(_) => counted()?,
             Choice::Levels(found, plan) if is_tabled => {
                 levels::write_tabled(head(Coding::StoredLevels), &found, &plan)?

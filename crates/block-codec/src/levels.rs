@@ -10,7 +10,7 @@
 //! ```
 //!
 //! With tables the arithmetic code has the list alone (from "number of levels" to "distances"). In front of it stands its length in bytes, a
-//! varint; behind it are the numbers of all rows as in module `tables`.
+//! varint; behind it are the numbers of all rows as in module `stored` (`learned` in blocks that say so).
 //!
 //! A level is an index of the block's grid, or a sample itself; both are mapped to unsigned integers of the same order.
 

@@ -1,11 +1,8 @@
 //! The writer's lanes: symbols of all rows and their counts, then from the last row to the first the words.
 
-use super::alphabet::{
-    CODES, CONTEXTS, ESCAPE, SIZE_FIELD, SMALLEST, SYMBOLS, first_context, next_context, symbol,
-};
-use super::stretches;
+use super::alphabet::{CODES, CONTEXTS, ESCAPE, SIZE_FIELD, SMALLEST, SYMBOLS, first_context, next_context, symbol};
 use super::weights::{Counts, SLOT_BITS, SLOTS, Tables};
-use crate::tables::words::{LANES, LOW, WORD_BITS};
+use super::words::{LANES, LOW, WORD_BITS, stretches};
 use crate::vectors::vectorised_narrow;
 use std::hint::select_unpredictable;
 
@@ -64,7 +61,10 @@ impl Symbols {
             let [mut a, mut b, mut c, mut d] = [Place::<OF_VALUES>::START; LANES];
             for ((p, q), (r, s)) in first.iter_mut().zip(second).zip(third.iter_mut().zip(fourth)) {
                 let found = [a.code(p, low), b.code(q, low), c.code(r, low), d.code(s, low)];
-                counts.iter_mut().zip(found).for_each(|(counts, code)| counts[code] += 1);
+                counts
+                    .iter_mut()
+                    .zip(found)
+                    .for_each(|(counts, code)| counts[code] += 1);
                 codes.push(found.map(|code| code as u16));
             }
         }
@@ -98,7 +98,11 @@ impl Symbols {
                 start += width;
             }
         }
-        let escapes = self.counts.iter().flat_map(|counts| counts.iter().step_by(SYMBOLS)).sum::<u32>() as usize;
+        let escapes = self
+            .counts
+            .iter()
+            .flat_map(|counts| counts.iter().step_by(SYMBOLS))
+            .sum::<u32>() as usize;
         vectorised_narrow(
             #[inline(always)]
             || {
@@ -177,7 +181,11 @@ struct Part {
 impl Part {
     fn new(start: u32, width: u32) -> Self {
         let reciprocal = (1_u64 << QUOTIENT_SHIFT).div_ceil(u64::from(width.max(1)));
-        Self { reciprocal, width, start }
+        Self {
+            reciprocal,
+            width,
+            start,
+        }
     }
 
     #[inline(always)]

@@ -2,7 +2,7 @@
 //!
 //! Symbols are those of differences, of differences of differences, or of values: indices less a centre. Each context has a table (modules
 //! `alphabet` and `weights`). Four lanes code four stretches of rows at a time, each with a state of its own: a processor works on all four
-//! at once. Their states and words are those of `tables::words`, with tables of 512 slots.
+//! at once. Their states and words are those of module `words`.
 //!
 //! ```text
 //! 32 a + 8 m + p varint   a: bytes of the arithmetic code; m: number of words modulo 4; p: pads
@@ -24,27 +24,28 @@
 //! three as words before those that are left. Its state is that of lane 0. It begins with `p` words that are zero, and ends with the state 1.
 
 mod alphabet;
+mod lane;
 mod lanes;
+pub(crate) mod order;
 mod plan;
 #[cfg(test)]
 mod tests;
 mod weights;
+pub(crate) mod words;
 
 use crate::arithmetic::{Coder, Reader, Writer};
 use crate::bytes::{Bytes, push_varint};
 use crate::error::Damaged;
 use crate::indices::code_first;
 use crate::rows::{LARGEST, damaged};
-use crate::tables::order::Order;
-use crate::tables::words::{LANES, LOW, Words};
 use crate::vectors::vectorised_narrow;
-use alphabet::Lane;
+use lane::{FIRST, Lane, SECOND, VALUES};
 use lanes::Symbols;
+use order::Order;
 pub(crate) use plan::{Plan, pco_order, sample_bits};
 use weights::{Entries, Tables};
+use words::{HEAD_BITS, LANES, PAD_BITS, STRETCH, Words, cut_off, stretches};
 
-/// Rows of a stretch.
-const STRETCH: usize = 512;
 /// Rows for which memory is reserved in advance, for each word.
 const ROWS_OF_A_WORD: usize = 64;
 /// Smallest number of rows of a block that is coded by stored tables.
@@ -60,22 +61,6 @@ const SIZE_BITS: u32 = 1;
 const MOST_LOW: u32 = 48 - SIZE_BITS;
 const LOW_FIELD: u32 = 6;
 const ORDER_FIELD: u32 = 2;
-/// Bits of the number of pads (words of three lanes and the state of the first one), and of that and the number of words modulo 4. Without
-/// the latter, a word too many or too few is rarely taken for a part of other rows.
-const PAD_BITS: u32 = 3;
-const HEAD_BITS: u32 = PAD_BITS + 2;
-
-/// What is coded of an index, as a parameter of loops.
-const VALUES: u8 = 0;
-const FIRST: u8 = 1;
-const SECOND: u8 = 2;
-
-/// Lengths of the stretches that four lanes take at a time.
-fn stretches(rows: usize) -> impl DoubleEndedIterator<Item = usize> {
-    let full = rows / (LANES * STRETCH);
-    let rest = (rows - full * LANES * STRETCH) / LANES;
-    std::iter::repeat_n(STRETCH, full).chain((rest > 0).then_some(rest))
-}
 
 /// What is stored before the tables.
 #[derive(Debug, Clone, Copy)]
@@ -100,7 +85,11 @@ impl Start {
             (0, _) => Order::First,
             (1, _) => Order::Second,
             (2, own) => {
-                let centre = if let Some(Order::Values { centre }) = own { centre } else { 0 };
+                let centre = if let Some(Order::Values { centre }) = own {
+                    centre
+                } else {
+                    0
+                };
                 let (centre, rests) = code_first(coder, own.map(|_| centre), false)?;
                 has_rests |= rests;
                 Order::Values { centre }
@@ -112,7 +101,12 @@ impl Start {
             return Err(Damaged::new("low bits", low, expected));
         }
         let tail = coder.raw(wanted.map_or(0, |start| u64::from(start.tail)), TAIL_FIELD) as u32;
-        Ok(Self { first, order, low, tail })
+        Ok(Self {
+            first,
+            order,
+            low,
+            tail,
+        })
     }
 
     /// Number of rows of all stretches, of so many rows behind the first one.
@@ -179,8 +173,7 @@ pub(crate) fn read(bytes: &[u8], rows: usize) -> Result<Vec<i64>, Damaged> {
     let block = Block {
         start,
         entries: tables.entries(is_of_values),
-        pads: head & ((1 << PAD_BITS) - 1),
-        words: head >> PAD_BITS & 3,
+        head,
     };
     match (start.order, start.low) {
         (Order::Values { .. }, _) => block.rest::<true, VALUES>(rows, bytes),
@@ -194,31 +187,17 @@ pub(crate) fn read(bytes: &[u8], rows: usize) -> Result<Vec<i64>, Damaged> {
 struct Block {
     start: Start,
     entries: Entries,
-    pads: u64,
-    /// Number of words modulo 4.
-    words: u64,
+    /// Numbers of pads, and of words modulo 4.
+    head: u64,
 }
 
 impl Block {
     /// All indices.
-    fn rest<const LOW_BITS: bool, const ORDER: u8>(
-        &self,
-        rows: usize,
-        mut bytes: Bytes<'_>,
-    ) -> Result<Vec<i64>, Damaged> {
-        let cut_off = || Damaged::new("block", "other words", "those that a writer of as many rows wrote");
-        let mut states = [0; LANES];
-        for state in &mut states {
-            *state = u32::from_le_bytes(bytes.array()?);
-        }
-        let (words, odd) = bytes.0.as_chunks();
-        if !odd.is_empty() || words.len() as u64 % 4 != self.words {
-            return Err(cut_off());
-        }
+    fn rest<const LOW_BITS: bool, const ORDER: u8>(&self, rows: usize, bytes: Bytes<'_>) -> Result<Vec<i64>, Damaged> {
+        let (mut states, mut words) = Words::begun(bytes, self.head >> PAD_BITS & 3)?;
         // Memory for all rows at once where so few bytes may hold them: a damaged number of rows takes no more than its bytes.
-        let mut indices = Vec::with_capacity(rows.min(1 + ROWS_OF_A_WORD * (words.len() + LANES)));
+        let mut indices = Vec::with_capacity(rows.min(1 + ROWS_OF_A_WORD * (words.count() + LANES)));
         indices.push(self.start.first);
-        let mut words = Words::new(words);
         let mut found = [0; LANES * STRETCH];
         for length in stretches(self.start.stretched(rows - 1)) {
             let found = &mut found[..LANES * length];
@@ -226,30 +205,24 @@ impl Block {
                 #[inline(always)]
                 || self.stretch::<LOW_BITS, ORDER>(&mut words, &mut states, found),
             );
-            // Checked here, so that time and memory are in proportion to the bytes.
-            if words.is_broken() || states.iter().any(|state| *state < LOW) {
-                return Err(cut_off());
-            }
+            words.check(&states)?;
             for found in found.chunks(length) {
                 self.push::<ORDER>(&mut indices, found)?;
             }
         }
-        let (first, others) = (states[0], &states[1..]);
-        if others.iter().any(|state| *state >= 2 * LOW) {
-            return Err(cut_off());
-        }
-        let late = words.behind(others.iter().map(|state| *state as u16));
-        let (mut words, mut state) = (Words::new(&late), first);
-        let pads = (0..self.pads).fold(0, |all, _| all | words.raw(&mut state, 16));
+        let late = words.late(&states)?;
+        let (mut words, mut state) = (Words::new(&late), states[0]);
+        let pads = words.pads(&mut state, self.head);
         let mut lane = Lane::<ORDER>::START;
         let found: Vec<i64> = (indices.len()..rows)
             .map(|_| lane.read::<LOW_BITS>(&self.entries, &mut state, &mut words, self.start.low))
             .collect();
         self.push::<ORDER>(&mut indices, &found)?;
-        if pads != 0 || words.is_broken() || !words.is_finished() || state != 1 {
-            return Err(cut_off());
+        if words.is_ended(pads, state) {
+            Ok(indices)
+        } else {
+            Err(cut_off())
         }
-        Ok(indices)
     }
 
     /// Appends the indices of a stretch: its sums, which begin with zero, and what they continue.
@@ -272,7 +245,13 @@ impl Block {
         let found = &indices[begun..];
         // Bits of all sizes together.
         if found.iter().fold(0, |bits, index| bits | index ^ index >> 63) >= 2 * LARGEST {
-            return Err(damaged(found.iter().copied().max_by_key(|index| index.unsigned_abs()).unwrap_or(0)));
+            return Err(damaged(
+                found
+                    .iter()
+                    .copied()
+                    .max_by_key(|index| index.unsigned_abs())
+                    .unwrap_or(0),
+            ));
         }
         Ok(())
     }

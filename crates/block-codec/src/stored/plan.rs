@@ -3,9 +3,9 @@
 use super::SIZE_BITS;
 use super::alphabet::{CODES, ESCAPE, SIZE_FIELD, SMALLEST, SYMBOLS};
 use super::lanes::Place;
+use super::order::Order;
 use crate::error::Damaged;
 use crate::indices::{LEVEL, to_wrapped_pco};
-use crate::tables::order::Order;
 use fewbits_node::elementary::log2;
 use pco::DeltaSpec;
 
@@ -190,6 +190,10 @@ impl Plan {
                 _ => estimated_bits::<false>(parts, low),
             },
         };
-        if usual < low { plan(low).shorter(plan(usual)) } else { plan(low) }
+        if usual < low {
+            plan(low).shorter(plan(usual))
+        } else {
+            plan(low)
+        }
     }
 }

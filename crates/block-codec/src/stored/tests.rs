@@ -194,7 +194,11 @@ fn tables_return() {
         let mut counts = [[0; alphabet::SYMBOLS]; alphabet::CONTEXTS];
         for (at, count) in counts.as_flattened_mut().iter_mut().enumerate() {
             let random = (at as u32 + 1).wrapping_mul(seed).wrapping_mul(2_654_435_761) >> 8;
-            *count = if random % 64 < seed % 60 { (random >> 6) >> (seed % 17) } else { 0 };
+            *count = if random % 64 < seed % 60 {
+                (random >> 6) >> (seed % 17)
+            } else {
+                0
+            };
         }
         let tables = Tables::of(&counts);
         let mut writer = Writer::default();
@@ -203,7 +207,12 @@ fn tables_return() {
         assert_eq!(Tables::code(&mut Reader::new(&bytes), None).unwrap(), tables);
         for (widths, counts) in tables.widths().zip(&counts) {
             assert_eq!(widths.iter().sum::<u32>() as usize, weights::SLOTS);
-            assert!(widths.iter().zip(counts).all(|(width, count)| *width > 0 || *count == 0));
+            assert!(
+                widths
+                    .iter()
+                    .zip(counts)
+                    .all(|(width, count)| *width > 0 || *count == 0)
+            );
         }
     }
 }

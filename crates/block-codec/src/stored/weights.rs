@@ -14,7 +14,8 @@
 //! A symbol's slots are in proportion to the square of its weight. Weights are square roots of counts, because counts have standard deviations in
 //! proportion to their square roots: then all weights have the same precision.
 
-use super::alphabet::{CONTEXTS, ESCAPE, SYMBOL_BITS, SYMBOLS, ZERO, next_context};
+use super::alphabet::{CONTEXTS, ESCAPE, SYMBOLS, ZERO, next_context};
+use super::words::fill_slots;
 use crate::arithmetic::Coder;
 use crate::counts::Count;
 use crate::error::Damaged;
@@ -67,14 +68,21 @@ impl Group {
             used += f32::from(u8::from(count > 0));
         }
         let all = sum.max(1) as f32;
-        let bits = if sum > 0 { all * log2(all) - own + BITS_OF_USED * used + bits_of_table } else { 1.0 };
+        let bits = if sum > 0 {
+            all * log2(all) - own + BITS_OF_USED * used + bits_of_table
+        } else {
+            1.0
+        };
         Self { contexts, counts, bits }
     }
 
     #[inline(always)]
     fn joined(&self, other: &Self, bits_of_table: f32) -> Self {
         let mut counts = self.counts;
-        counts.iter_mut().zip(other.counts).for_each(|(own, other)| *own += other);
+        counts
+            .iter_mut()
+            .zip(other.counts)
+            .for_each(|(own, other)| *own += other);
         Self::new(self.contexts + other.contexts, counts, bits_of_table)
     }
 }
@@ -88,7 +96,10 @@ impl Tables {
         let lowest = (1..ZERO).find(is_used).unwrap_or(ZERO);
         let highest = (ZERO + 1..SYMBOLS).rev().find(is_used).unwrap_or(ZERO);
         let bits_of_table = BITS_OF_ANY * (highest - lowest) as f32;
-        let mut groups: Vec<Group> = counts.iter().map(|counts| Group::new(1, *counts, bits_of_table)).collect();
+        let mut groups: Vec<Group> = counts
+            .iter()
+            .map(|counts| Group::new(1, *counts, bits_of_table))
+            .collect();
         let mut joined: Vec<Group> = groups
             .windows(2)
             .map(|pair| pair[0].joined(&pair[1], bits_of_table))
@@ -96,7 +107,9 @@ impl Tables {
         loop {
             let saved = |at: usize| groups[at].bits + groups[at + 1].bits - joined[at].bits;
             let best = (0..joined.len()).max_by(|a, b| saved(*a).total_cmp(&saved(*b)));
-            let Some(at) = best.filter(|at| saved(*at) >= 0.0) else { break };
+            let Some(at) = best.filter(|at| saved(*at) >= 0.0) else {
+                break;
+            };
             groups[at] = joined.remove(at);
             groups.remove(at + 1);
             if at > 0 {
@@ -109,11 +122,16 @@ impl Tables {
         let largest = groups.iter().flat_map(|group| group.counts).max().unwrap_or(0) as f32;
         let share = 1.0 / ROWS_OF_ONE.max(largest / (LARGEST_WEIGHT * LARGEST_WEIGHT) as f32);
         let weight = |count: u32| ((count as f32 * share).sqrt() + 0.5) as u32;
-        let weights = groups
-            .iter()
-            .map(|group| group.counts.map(|count| weight(count).clamp(count.min(1), LARGEST_WEIGHT) as u8));
+        let weights = groups.iter().map(|group| {
+            group
+                .counts
+                .map(|count| weight(count).clamp(count.min(1), LARGEST_WEIGHT) as u8)
+        });
         let mut table_of = [0; CONTEXTS];
-        let tables = groups.iter().enumerate().flat_map(|(at, group)| std::iter::repeat_n(at, group.contexts));
+        let tables = groups
+            .iter()
+            .enumerate()
+            .flat_map(|(at, group)| std::iter::repeat_n(at, group.contexts));
         table_of.iter_mut().zip(tables).for_each(|(own, table)| *own = table);
         Self {
             sizes: [ZERO - lowest, highest - ZERO],
@@ -128,7 +146,9 @@ impl Tables {
         let sizes = told.map(|size| coder.raw(size as u64, SIZES_FIELD) as usize);
         let (mut join, mut table_of) = (Count::NEW, [0; CONTEXTS]);
         for context in 1..CONTEXTS {
-            let own = wanted.as_ref().is_some_and(|tables| tables.table_of[context] == tables.table_of[context - 1]);
+            let own = wanted
+                .as_ref()
+                .is_some_and(|tables| tables.table_of[context] == tables.table_of[context - 1]);
             let is_joined = join.decide(coder, own);
             table_of[context] = table_of[context - 1] + usize::from(!is_joined);
         }
@@ -141,7 +161,11 @@ impl Tables {
         if coder.overran() {
             return Err(Damaged::new("tables", "cut off", "a weight for each symbol"));
         }
-        Ok(Self { sizes, table_of, weights })
+        Ok(Self {
+            sizes,
+            table_of,
+            weights,
+        })
     }
 
     /// The slots of the symbols in each context.
@@ -241,17 +265,7 @@ fn widths(weights: &[u8; SYMBOLS]) -> Widths {
         ((halves + 1) >> 1).max(square.min(1))
     });
     widths[ESCAPE] = widths[ESCAPE].max(1);
-    // The largest gives or takes what is left. While there are too many it has `SLOTS / SYMBOLS` at least, so each round takes some.
-    let mut over = widths.iter().sum::<u32>() as i32 - SLOTS as i32;
-    while over != 0 {
-        // Size and place of the first of the largest ones in one number.
-        let sizes = widths.iter().zip((0..SYMBOLS as u32).rev());
-        let largest = sizes.fold(0, |most, (width, place)| most.max(width << SYMBOL_BITS | place));
-        let place = SYMBOLS - 1 - largest as usize % SYMBOLS;
-        let taken = over.min((largest >> SYMBOL_BITS) as i32 / 2);
-        widths[place] = (widths[place] as i32 - taken) as u32;
-        over -= taken;
-    }
+    fill_slots(&mut widths, SLOTS);
     widths
 }
 
@@ -281,7 +295,7 @@ impl Entry {
     /// First slot of the table of the next context.
     #[inline(always)]
     pub(super) fn next_table(self) -> usize {
-        (self.0 >> (NEXT_SHIFT - SLOT_BITS)) as usize % (CONTEXTS << SLOT_BITS) & !(SLOTS - 1)
+        ((self.0 >> NEXT_SHIFT) as usize % CONTEXTS) << SLOT_BITS
     }
 }
 
@@ -292,6 +306,6 @@ impl Entries {
     /// The slot of a state in the table that begins there.
     #[inline(always)]
     pub(super) fn at(&self, table: usize, state: u32) -> Entry {
-        Entry(self.0[(table | state as usize % SLOTS) % (CONTEXTS * SLOTS)])
+        Entry(self.0[(table | (state as usize % SLOTS)) % (CONTEXTS * SLOTS)])
     }
 }

@@ -49,6 +49,53 @@ proptest! {
     }
 }
 
+/// Columns of many rows that no grid, or only the last one, suits: each returns within the bound or to the last bit.
+#[test]
+fn wild_columns_of_many_rows_return() {
+    let mixed = mixed(9, 2600);
+    let wild: [fn(usize, f64) -> f64; 12] = [
+        |_, _| f64::NAN,
+        |_, _| 7.0,
+        |row, x| if row % 3 == 0 { f64::INFINITY } else { x },
+        |row, x| if row % 700 == 0 { f64::NEG_INFINITY } else { x },
+        |row, x| if row % 2 == 0 { -0.0 } else { x.floor() * 0.0 },
+        |row, _| f64::from_bits(row as u64 % 5),
+        |row, _| 9_223_372_036_854_775_808.0 - 2048.0 * (row % 7) as f64,
+        |row, _| f64::MAX * if row % 50 < 25 { 1.0 } else { -1.0 },
+        |row, x| x + 1e9 * (row / 500) as f64,
+        |row, x| (x * 1e-3).exp() * 10.0_f64.powi((row % 600) as i32 - 300),
+        |row, x| if row < 2500 { 1.0 } else { x },
+        |row, _| (row as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) as f64,
+    ];
+    for (kind, wild) in wild.iter().enumerate() {
+        let samples: Vec<f64> = mixed.iter().enumerate().map(|(row, x)| wild(row, *x)).collect();
+        for codec in [
+            fast(1e-3),
+            fast(40.0),
+            fast(1e300),
+            BlockCodec::lossless().with_effort(Effort::Fast),
+        ] {
+            for rows in [1024, 1025, 1027, 2600] {
+                let bytes = codec.encode(&samples[..rows]).unwrap();
+                assert!(bytes.len() <= 9 * rows + 300, "{kind}: {}", bytes.len());
+                let values = codec.decode(&bytes, rows).unwrap();
+                let bound = [1e-3, 40.0, 1e300]
+                    .into_iter()
+                    .find(|bound| fast(*bound) == codec)
+                    .unwrap_or(0.0);
+                assert!(
+                    values
+                        .iter()
+                        .zip(&samples)
+                        .all(|(value, sample)| value.to_bits() == sample.to_bits()
+                            || (bound > 0.0 && (value - sample).abs() <= bound)),
+                    "{kind}, {rows} rows, {codec:?}"
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn blocks_of_many_rows_have_tables() {
     let samples = mixed(3, 4000);
