@@ -3,10 +3,10 @@
 use crate::bytes::{Bytes, unzigzag};
 use crate::error::Damaged;
 use crate::grid::{DECIMALS, Grid, PHASES};
-use crate::head::{CIRCLE, Coding, Head, LINE, SAMPLES, SINGLE, TABLED, WRAPPED};
+use crate::head::{CIRCLE, Coding, Head, LINE, SAMPLES, SINGLE, STORED, TABLED, WRAPPED};
 use crate::indices::{from_pco_bytes, from_wrapped_pco, raw_samples, read_block};
 use crate::rows::Others;
-use crate::{Accuracy, BlockCodec, Error, check_rows, levels, tables};
+use crate::{Accuracy, BlockCodec, Error, check_rows, learned, levels, stored};
 
 impl BlockCodec {
     /// The samples of a block of `rows` rows.
@@ -42,7 +42,11 @@ impl BlockCodec {
                     keys.into_iter().map(levels::sample_of_key).collect()
                 }
                 Coding::TabledLevels => {
-                    let keys = levels::read_tabled(rest, rows)?;
+                    let keys = levels::read_tabled(rest, rows, learned::read)?;
+                    keys.into_iter().map(levels::sample_of_key).collect()
+                }
+                Coding::StoredLevels => {
+                    let keys = levels::read_tabled(rest, rows, stored::read)?;
                     keys.into_iter().map(levels::sample_of_key).collect()
                 }
                 _ => from_pco_bytes::<f64>(rest, rows)?,
@@ -59,12 +63,17 @@ impl BlockCodec {
                 keys.into_iter().map(levels::index_of_key).collect()
             }
             Coding::TabledLevels => {
-                let keys = levels::read_tabled(rest, rows)?;
+                let keys = levels::read_tabled(rest, rows, learned::read)?;
+                keys.into_iter().map(levels::index_of_key).collect()
+            }
+            Coding::StoredLevels => {
+                let keys = levels::read_tabled(rest, rows, stored::read)?;
                 keys.into_iter().map(levels::index_of_key).collect()
             }
             Coding::Wrapped => from_wrapped_pco::<i64>(rest, rows)?,
             Coding::Counts => read_block(rest, false, &grid, rows, None)?,
-            Coding::Tables => tables::read(rest, rows)?,
+            Coding::Tables => learned::read(rest, rows)?,
+            Coding::Stored => stored::read(rest, rows)?,
             _ => from_pco_bytes::<i64>(rest, rows)?,
         };
         let mut samples = grid.values(&indices);
@@ -118,10 +127,12 @@ impl BlockCodec {
             _ => return Err(Damaged::new("head", head, "a grid and a coding that belong together")),
         };
         let [second] = if head & 128 == 0 { [0] } else { bytes.array()? };
-        let [is_single, is_wrapped, is_tabled] = [SINGLE, WRAPPED, TABLED].map(|flag| second & flag != 0);
-        if second > 127
+        let [is_single, is_wrapped, is_learned, is_stored] =
+            [SINGLE, WRAPPED, TABLED, STORED].map(|flag| second & flag != 0);
+        let is_tabled = is_learned || is_stored;
+        if (is_learned && is_stored)
             || (head & 128 != 0 && second == 0)
-            || (kind == SAMPLES && head & 128 != 0 && (second, coding) != (TABLED, Coding::Levels))
+            || (kind == SAMPLES && head & 128 != 0 && (!matches!(second, TABLED | STORED) || coding != Coding::Levels))
             || (kind == SAMPLES && head & 64 != 0 && coding != Coding::Levels)
             || (is_single && (second & 2 == 0 || kind >= DECIMALS))
             || (is_wrapped && coding != Coding::Pco)
@@ -152,6 +163,8 @@ impl BlockCodec {
         };
         let coding = match coding {
             Coding::Pco if is_wrapped => Coding::Wrapped,
+            Coding::Counts if is_stored => Coding::Stored,
+            Coding::Levels if is_stored => Coding::StoredLevels,
             Coding::Counts if is_tabled => Coding::Tables,
             Coding::Levels if is_tabled => Coding::TabledLevels,
             coding => coding,

@@ -4,7 +4,7 @@ use crate::grid::Grid;
 use crate::head::{Coding, SAMPLES, write_head};
 use crate::indices::{smallest_pco, write_block};
 use crate::rows::Others;
-use crate::tables::TABLES_ROWS;
+use crate::stored::STORED_ROWS;
 use crate::vectors::vectorised;
 use crate::{Accuracy, BlockCodec, Effort, Error, check_rows, levels};
 use std::borrow::Cow;
@@ -124,7 +124,7 @@ impl BlockCodec {
 
     /// Whether blocks of so many rows are coded by tables.
     pub(crate) fn is_tabled(&self, rows: usize) -> bool {
-        self.effort == Effort::Fast && rows >= TABLES_ROWS
+        self.effort == Effort::Fast && rows >= STORED_ROWS
     }
 
     /// The grids that are tried; none if only the samples' own bits fit.

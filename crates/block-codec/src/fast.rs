@@ -2,9 +2,9 @@
 
 use crate::encode::raw;
 use crate::grid::Grid;
-use crate::head::{Coding, SAMPLES, TABLED, write_head};
+use crate::head::{Coding, SAMPLES, STORED, write_head};
 use crate::indices::{LEVEL, to_wrapped_pco, write_block};
-use crate::tables::{self, Plan};
+use crate::stored::{self, Plan};
 use crate::{BlockCodec, Effort, Error, levels};
 use pco::DeltaSpec;
 
@@ -16,8 +16,6 @@ const VERY_FINE: f32 = 12.0;
 const LEVEL_BITS: f32 = 4.0;
 /// Bits of an exception.
 const EXCEPTION_BITS: f32 = 72.0;
-/// Bits per sample up to which counts are tried besides tables: they may be shorter, and are fast.
-const SPARSE: f32 = 1.0;
 
 type Levels = (Vec<u64>, Vec<i64>);
 
@@ -66,12 +64,12 @@ impl BlockCodec {
     fn encode_samples(&self, samples: &[f64]) -> Result<Vec<u8>, Error> {
         let keys = samples.iter().map(|sample| levels::key_of_sample(*sample));
         let found = few_levels(keys).map(|(found, plan, bits)| -> Result<_, Error> {
-            let is_shorter = bits < FINE as f32 || bits < tables::sample_bits(samples)?;
+            let is_shorter = bits < FINE as f32 || bits < stored::sample_bits(samples)?;
             Ok(is_shorter.then_some((found, plan)))
         });
         if let Some((found, plan)) = found.transpose()?.flatten() {
             return Ok(if self.is_tabled(samples.len()) {
-                levels::write_tabled(vec![SAMPLES | 128, TABLED], &found, &plan)?
+                levels::write_tabled(vec![SAMPLES | 128, STORED], &found, &plan)?
             } else {
                 levels::write(vec![SAMPLES], false, &found, None)?
             });
@@ -97,13 +95,13 @@ impl BlockCodec {
             }
         }
         if plain > FINE as f32 {
-            let (order, bits) = tables::pco_order(&indices);
+            let (order, bits) = stored::pco_order(&indices);
             if bits < least {
                 (least, choice) = (bits, Choice::Pco(order));
             }
         }
         least += EXCEPTION_BITS * exceptions.len() as f32 / samples.len() as f32;
-        if least > VERY_FINE && tables::sample_bits(samples)? < least {
+        if least > VERY_FINE && stored::sample_bits(samples)? < least {
             return Ok(None);
         }
         let head = |coding| {
@@ -113,15 +111,10 @@ impl BlockCodec {
         };
         let counted = || write_block(false, grid, &indices, &exceptions, None);
         Ok(Some(match choice {
-            Choice::Symbols(plan) if is_tabled => {
-                let bytes = tables::write(&indices, &plan, head(Coding::Tables))?;
-                let bits = 8.0 * bytes.len() as f32 / samples.len() as f32;
-                let other = if bits <= SPARSE { Some(counted()?) } else { None };
-                other.filter(|other| other.len() < bytes.len()).unwrap_or(bytes)
-            }
+            Choice::Symbols(plan) if is_tabled => stored::write(&indices, &plan, head(Coding::Stored))?,
             Choice::Symbols(_) => counted()?,
             Choice::Levels(found, plan) if is_tabled => {
-                levels::write_tabled(head(Coding::TabledLevels), &found, &plan)?
+                levels::write_tabled(head(Coding::StoredLevels), &found, &plan)?
             }
             Choice::Levels(found, _) => levels::write(head(Coding::Levels), false, &found, None)?,
             Choice::Pco(order) => {

@@ -8,10 +8,12 @@ pub(crate) const LINE: u8 = 13;
 pub(crate) const CIRCLE: u8 = 14;
 pub(crate) const SAMPLES: u8 = 15;
 
-/// Flags of the second byte: decimals are rounded to single precision; pco is in its wrapped form; tables follow the counts, or the list of levels.
+/// Flags of the second byte: decimals are rounded to single precision; pco is in its wrapped form; tables that learn follow the counts, or the list
+/// of levels; stored tables are in place of the counts, or follow the list of levels.
 pub(crate) const SINGLE: u8 = 16;
 pub(crate) const WRAPPED: u8 = 32;
 pub(crate) const TABLED: u8 = 64;
+pub(crate) const STORED: u8 = 128;
 
 /// How the indices are coded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,12 +22,16 @@ pub(crate) enum Coding {
     Pco,
     Raw,
     Counts,
-    /// Counts, then tables of symbols.
+    /// Counts, then tables of symbols that learn. Not written.
     Tables,
     /// A list of levels, and their numbers.
     Levels,
-    /// A list of levels, and tables of symbols for their numbers.
+    /// A list of levels, and tables that learn for their numbers. Not written.
     TabledLevels,
+    /// Tables of symbols that the block stores.
+    Stored,
+    /// A list of levels, and stored tables for their numbers.
+    StoredLevels,
     /// pco in its wrapped form.
     Wrapped,
 }
@@ -54,6 +60,8 @@ pub(crate) fn write_head(grid: &Grid, coding: Coding, joint: bool, exceptions: &
         Coding::Counts => (3, 0),
         Coding::Tables => (3, TABLED),
         Coding::TabledLevels => (2, TABLED),
+        Coding::Stored => (3, STORED),
+        Coding::StoredLevels => (2, STORED),
     };
     let moved = if grid.phase() == 0 { 0 } else { 8 };
     let second = own | moved | form | u8::from(!exceptions.is_empty());

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! With tables the arithmetic code has the list alone (from "number of levels" to "distances"). In front of it stands its length in bytes, a
-//! varint; behind it are the numbers of all rows as in module `tables`.
+//! varint; behind it are the numbers of all rows as in module `stored` (`learned` in blocks that say so).
 //!
 //! A level is an index of the block's grid, or a sample itself; both are mapped to unsigned integers of the same order.
 
@@ -21,7 +21,7 @@ use crate::counts::{Count, gamma};
 use crate::error::Damaged;
 use crate::indices::{Rest, code_rest};
 use crate::rows::Others;
-use crate::tables::{self, Plan};
+use crate::stored::{self, Plan};
 
 /// Probability, in units of `2^-16`, that numbers are coded by models.
 const BY_MODELS: u32 = 61_440;
@@ -203,17 +203,21 @@ pub(crate) fn write_tabled(
     let list = writer.finish();
     push_varint(&mut head, list.len() as u64);
     head.extend_from_slice(&list);
-    tables::write(numbers, plan, head)
+    stored::write(numbers, plan, head)
 }
 
-/// The keys of all rows of a block of [`write_tabled`].
-pub(crate) fn read_tabled(bytes: &[u8], rows: usize) -> Result<Vec<u64>, Damaged> {
+/// The keys of all rows of a block of [`write_tabled`], whose numbers `read` reads.
+pub(crate) fn read_tabled(
+    bytes: &[u8],
+    rows: usize,
+    read: fn(&[u8], usize) -> Result<Vec<i64>, Damaged>,
+) -> Result<Vec<u64>, Damaged> {
     let mut bytes = Bytes(bytes);
     let length = bytes.count(usize::MAX, "length of levels")?;
     let mut reader = Reader::new(bytes.take(length)?);
     let levels = code_levels(&mut reader, None, rows)?;
     reader.finish()?;
-    let numbers = tables::read(bytes.0, rows)?;
+    let numbers = read(bytes.0, rows)?;
     let level = |number: i64| usize::try_from(number).ok().and_then(|number| levels.get(number));
     let levels = numbers.into_iter().map(|number| level(number).copied());
     levels.collect::<Option<_>>().ok_or_else(beyond_the_list)

@@ -1,8 +1,9 @@
 //! What a block's tables code, chosen from counts in a part of its rows.
 
+use super::SIZE_BITS;
+use super::alphabet::{CODES, ESCAPE, SIZE_FIELD, SMALLEST, SYMBOLS};
+use super::lanes::Place;
 use super::order::Order;
-use super::symbols::estimated_bits;
-use super::{OF_VALUES, SIZE_BITS};
 use crate::error::Damaged;
 use crate::indices::{LEVEL, to_wrapped_pco};
 use fewbits_node::elementary::log2;
@@ -13,8 +14,10 @@ const PARTS: usize = 16;
 const PART_ROWS: usize = 64;
 /// Values are considered if their size has less than so many bits more than that of differences, in the mean.
 const MORE_BITS: usize = 2;
-/// Largest number of low bits of values: its field has six bits.
-const MOST_LOW: u32 = 63 - OF_VALUES;
+/// One difference of so many may be longer than the cells of symbols.
+const ROWS_OF_LONG: usize = 64;
+/// Weight of the frequencies of all contexts in each, in symbols.
+const COMMON: f32 = 24.0;
 
 /// What is coded, with how many low bits, and the bits of a row as estimated.
 #[derive(Debug, Clone, Copy)]
@@ -44,10 +47,42 @@ fn size((_, parts): &Coded) -> usize {
     parts.iter().flatten().map(bits).sum()
 }
 
-/// Differences, or their differences if these are smaller.
-fn differences(indices: &[i64]) -> Coded {
+/// The best plan for differences, or for their differences if these are smaller.
+fn of_differences(indices: &[i64]) -> (Plan, usize) {
     let [first, second] = [Order::First, Order::Second].map(|order| coded(order, indices));
-    if size(&second) < size(&first) { second } else { first }
+    let own = Plan::of(&first);
+    if size(&second) >= size(&first) {
+        return (own, size(&first));
+    }
+    (own.shorter(Plan::of(&second)), size(&second))
+}
+
+/// Estimated bits of a row: each of these runs of differences is coded by the counts of all its other symbols.
+fn estimated_bits<const OF_VALUES: bool>(runs: &[Vec<i64>], low: u32) -> f32 {
+    let (mut counts, mut all) = ([0_u16; CODES], [0_u16; SYMBOLS]);
+    let (mut rows, mut raw) = (0, 0);
+    for run in runs {
+        let mut place = Place::<OF_VALUES>::START;
+        for mut difference in run.iter().copied() {
+            let code = place.code(&mut difference, low);
+            counts[code] += 1;
+            all[code % SYMBOLS] += 1;
+            raw += low;
+            if code % SYMBOLS == ESCAPE {
+                raw += SIZE_FIELD + (difference >> low).unsigned_abs().ilog2();
+            }
+        }
+        rows += run.len();
+    }
+    let common = all.map(|count| COMMON * f32::from(count) / rows.max(1) as f32);
+    let mut sum = raw as f32;
+    for counts in counts.chunks(SYMBOLS) {
+        let other = counts.iter().sum::<u16>() as f32 + COMMON - 1.0;
+        for (count, common) in counts.iter().zip(common).filter(|(count, _)| **count > 0) {
+            sum += f32::from(*count) * log2(other / (f32::from(*count) - 1.0 + common));
+        }
+    }
+    sum / rows.max(1) as f32
 }
 
 /// Orders of differences of pco that are considered.
@@ -110,41 +145,55 @@ impl Plan {
         let (sum, rows) = parts(indices)
             .flatten()
             .fold((0_i128, 0), |(sum, rows), index| (sum + i128::from(*index), rows + 1));
-        let values = coded(
-            Order::Values {
-                centre: (sum / rows) as i64,
-            },
-            indices,
-        );
-        let differences = differences(indices);
-        let is_close = size(&values) < size(&differences) + MORE_BITS * rows as usize;
-        let own = Self::of(&differences);
-        let other = is_close
-            .then(|| Self::of(&values))
-            .filter(|other| other.low <= MOST_LOW);
-        other.filter(|other| other.bits < own.bits).unwrap_or(own)
+        let centre = (sum / rows) as i64;
+        let values = coded(Order::Values { centre }, indices);
+        let (own, size_of_differences) = of_differences(indices);
+        if size(&values) < size_of_differences + MORE_BITS * rows as usize {
+            own.shorter(Self::of(&values))
+        } else {
+            own
+        }
     }
 
     /// The better one of differences and their differences.
     pub(crate) fn of_differences(indices: &[i64]) -> Self {
-        Self::of(&differences(indices))
+        of_differences(indices).0
     }
 
-    /// The plan of this order.
+    fn shorter(self, other: Self) -> Self {
+        if other.bits < self.bits { other } else { self }
+    }
+
+    /// The plan of this order. The number of low bits follows the mean size, or where few differences make most of that, the sizes of all
+    /// but these.
     pub(super) fn of((order, parts): &Coded) -> Self {
-        let rows: usize = parts.iter().map(Vec::len).sum();
-        let sum: u128 = parts.iter().flatten().map(|d| u128::from(d.unsigned_abs())).sum();
+        let (mut sum, mut rows, mut lengths) = (0_u128, 0, [0; u64::BITS as usize + 1]);
+        for difference in parts.iter().flatten() {
+            let size = difference.unsigned_abs();
+            sum += u128::from(size);
+            rows += 1;
+            lengths[(u64::BITS - size.leading_zeros()) as usize] += 1;
+        }
         let mean = (sum / rows.max(1) as u128) as u64;
         let low = mean.checked_ilog2().map_or(0, |bits| bits.saturating_sub(SIZE_BITS));
-        let runs = parts.iter().map(Vec::as_slice);
-        let bits = match order {
-            Order::Values { .. } => estimated_bits::<true>(runs, low),
-            _ => estimated_bits::<false>(runs, low),
-        };
-        Self {
+        let mut longer = rows;
+        let most = lengths.iter().take_while(|count| {
+            longer -= **count;
+            longer > rows / ROWS_OF_LONG
+        });
+        let usual = (most.count() as u32).saturating_sub(SMALLEST);
+        let plan = |low| Self {
             order: *order,
             low,
-            bits,
+            bits: match order {
+                Order::Values { .. } => estimated_bits::<true>(parts, low),
+                _ => estimated_bits::<false>(parts, low),
+            },
+        };
+        if usual < low {
+            plan(low).shorter(plan(usual))
+        } else {
+            plan(low)
         }
     }
 }

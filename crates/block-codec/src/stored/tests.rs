@@ -4,7 +4,6 @@
 
 use super::plan::coded;
 use super::*;
-use crate::rows::LARGEST;
 use proptest::prelude::*;
 
 /// Stretches of rest, walk, steps of one size, and jumps up to the largest index.
@@ -29,12 +28,12 @@ fn pieces() -> impl Strategy<Value = Vec<i64>> {
                 };
                 indices.push(next.clamp(-LARGEST, LARGEST - 1));
             }
-            if indices.len() > TABLES_ROWS + 600 {
+            if indices.len() > STORED_ROWS + 600 {
                 break;
             }
         }
         indices.truncate(5000);
-        let rows = indices.len().max(TABLES_ROWS);
+        let rows = indices.len().max(STORED_ROWS);
         indices.resize(rows, 7);
         indices
     })
@@ -47,7 +46,6 @@ proptest! {
     fn indices_return_and_other_lengths_are_refused(indices in pieces(), order in 0..3_usize, centre in -LARGEST..=LARGEST) {
         let order = [Order::Values { centre }, Order::First, Order::Second][order];
         let plan = Plan::of(&coded(order, &indices));
-        let plan = Plan { low: if order == (Order::Values { centre }) { plan.low % 16 } else { plan.low }, ..plan };
         let bytes = write(&indices, &plan, Vec::new()).unwrap();
         prop_assert!(read(&bytes, indices.len()).unwrap() == indices);
         for more in 1..8 {
@@ -61,7 +59,7 @@ proptest! {
     fn damaged_bytes_give_the_stated_rows_or_an_error(
         indices in pieces(),
         damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20),
-        rows in prop_oneof![Just(None), (TABLES_ROWS..20_000).prop_map(Some)],
+        rows in prop_oneof![Just(None), (STORED_ROWS..20_000).prop_map(Some)],
     ) {
         let mut bytes = write(&indices, &Plan::new(&indices), Vec::new()).unwrap();
         let rows = rows.unwrap_or(indices.len());
@@ -101,29 +99,29 @@ fn differences_of_every_size_return() {
 /// A reader that meets the end of the words, or states that no writer writes, stops at the next stretch.
 #[test]
 fn stated_rows_take_no_memory_that_the_bytes_do_not_fill() {
-    let indices = vec![5; TABLES_ROWS];
+    let indices = vec![5; STORED_ROWS];
     let bytes = write(&indices, &Plan::new(&indices), Vec::new()).unwrap();
     assert!(bytes.len() < 40, "{}", bytes.len());
-    for rows in [TABLES_ROWS + 1, 1 << 20, 1 << 40, usize::MAX] {
+    for rows in [STORED_ROWS + 1, 1 << 20, 1 << 40, usize::MAX] {
         assert!(read(&bytes, rows).is_err(), "{rows}");
     }
     // States below the smallest one never take up bits and are refused.
     let at = bytes.len() - bytes.len() % 2 - 16;
     let mut low = bytes;
     low[at..].fill(0);
-    assert!(read(&low, TABLES_ROWS).is_err());
+    assert!(read(&low, STORED_ROWS).is_err());
 }
 
 /// The states at the end of the stretches have redundancy; only the last words, which the tail reads, have none.
 #[test]
-fn hardly_a_flipped_bit_behind_the_counts_is_accepted() {
+fn hardly_a_flipped_bit_behind_the_tables_is_accepted() {
     let indices: Vec<i64> = (0..3000_u64)
         .map(|row| (((row * row * 2_654_435_761) >> 20) & 7) as i64)
         .collect();
     let bytes = write(&indices, &Plan::new(&indices), Vec::new()).unwrap();
     let mut reader = Bytes(&bytes);
-    let warm = (reader.varint().unwrap() >> HEAD_BITS) as usize;
-    let from = bytes.len() - reader.0.len() + warm;
+    let stored = (reader.varint().unwrap() >> HEAD_BITS) as usize;
+    let from = bytes.len() - reader.0.len() + stored;
     let accepted = (8 * from..8 * bytes.len()).filter(|bit| {
         let mut flipped = bytes.clone();
         flipped[bit / 8] ^= 1 << (bit % 8);
@@ -175,4 +173,46 @@ fn values_without_memory_are_coded_as_values() {
     let bits = 8.0 * write(&indices, &plan, Vec::new()).unwrap().len() as f64 / 20_000.0;
     assert!(bits < 1.02 * 12.0_f64.log2(), "{bits}");
     assert!((f64::from(plan.bits) / bits - 1.0).abs() < 0.1, "{plan:?} for {bits}");
+}
+
+/// A state is divided by the width of a symbol with the quotient that division has, next to each multiple and at both ends.
+#[test]
+fn quotients_by_reciprocals_are_exact() {
+    for width in 1..=weights::SLOTS as u64 {
+        let limit = width << (32 - weights::SLOT_BITS);
+        let near = [1, 2, 3, limit / width / 2, limit / width - 1, limit / width].map(|factor| factor * width);
+        for x in near.into_iter().flat_map(|x| [x - 1, x, x + 1]).filter(|x| *x < limit) {
+            assert_eq!(lanes::quotient(x as u32, width as u32), (x / width) as u32, "{x} by {width}");
+        }
+    }
+}
+
+/// Tables for counts of every shape return, and fill their slots.
+#[test]
+fn tables_return() {
+    for seed in 1..200_u32 {
+        let mut counts = [[0; alphabet::SYMBOLS]; alphabet::CONTEXTS];
+        for (at, count) in counts.as_flattened_mut().iter_mut().enumerate() {
+            let random = (at as u32 + 1).wrapping_mul(seed).wrapping_mul(2_654_435_761) >> 8;
+            *count = if random % 64 < seed % 60 {
+                (random >> 6) >> (seed % 17)
+            } else {
+                0
+            };
+        }
+        let tables = Tables::of(&counts);
+        let mut writer = Writer::default();
+        Tables::code(&mut writer, Some(tables.clone())).unwrap();
+        let bytes = writer.finish();
+        assert_eq!(Tables::code(&mut Reader::new(&bytes), None).unwrap(), tables);
+        for (widths, counts) in tables.widths().zip(&counts) {
+            assert_eq!(widths.iter().sum::<u32>() as usize, weights::SLOTS);
+            assert!(
+                widths
+                    .iter()
+                    .zip(counts)
+                    .all(|(width, count)| *width > 0 || *count == 0)
+            );
+        }
+    }
 }

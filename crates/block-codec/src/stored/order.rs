@@ -5,7 +5,7 @@ use crate::rows::{LARGEST, damaged};
 
 /// What is coded of each index behind the first one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Order {
+pub(crate) enum Order {
     /// The index less the centre.
     Values { centre: i64 },
     /// The index less the one before.
@@ -16,7 +16,7 @@ pub(super) enum Order {
 
 impl Order {
     /// What is coded of all indices but the first.
-    pub(super) fn differences(self, indices: &[i64]) -> Vec<i64> {
+    pub(crate) fn differences(self, indices: &[i64]) -> Vec<i64> {
         let Some((first, others)) = indices.split_first() else {
             return Vec::new();
         };
@@ -33,7 +33,7 @@ impl Order {
     }
 
     /// Appends the indices of these differences, the inverse of [`differences`](Self::differences).
-    pub(super) fn push_indices(self, indices: &mut Vec<i64>, differences: &[i64]) -> Result<(), Damaged> {
+    pub(crate) fn push_indices(self, indices: &mut Vec<i64>, differences: &[i64]) -> Result<(), Damaged> {
         let last = indices[indices.len() - 1];
         let slope = last - indices[indices.len().max(2) - 2];
         let start = indices.len();
