@@ -59,12 +59,10 @@ fn best(row: &str) -> f64 {
         let start = System::ideal(model.clone(), vec![lloyd(levels, model.sample_deviation(0)); 2]).unwrap();
         design::multi_start(&start, criterion, 20, 1, &Newton::default()).unwrap()
     } else {
-        let request = Request::estimation(model.clone(), BitBudget::Each(levels.ilog2()), Link::PERFECT);
-        let request = request.with_cells(AllowedCells::Any).with_starts(60);
-        let request = if criterion == MI {
-            request.by_information()
-        } else {
-            request
+        let request = Request {
+            criterion,
+            cells: AllowedCells::Any,
+            ..Request::estimation(model.clone(), BitBudget::Each(levels.ilog2()), Link::PERFECT)
         };
         // Newton's method stays where it is, and has the curvature.
         joint(request.run().unwrap().best().system(), criterion)

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::outcomes::counts::Compositions;
-use crate::outcomes::{Feature, Table, cell_probabilities, for_each_log, moments};
+use crate::outcomes::{Feature, Table, cell_probabilities, for_each, for_each_log, moments};
 use crate::system::{SensorGroup, System};
 use fewbits_numerics::{kernels, normal};
 
@@ -175,6 +175,12 @@ impl Reports {
             tables,
             log_multiplicity,
         })
+    }
+
+    /// Visits the report probabilities at the nodes of every joint outcome.
+    pub(crate) fn for_each(&self, mut visit: impl FnMut(&[f64])) {
+        let nodes = self.tables.first().map_or(0, |table| table.nodes);
+        for_each(&self.tables.iter().collect::<Vec<_>>(), &vec![1.0; nodes], |_, product| visit(product));
     }
 
     /// For every joint outcome, its moments: the features of the product of its report probabilities.

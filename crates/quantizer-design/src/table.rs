@@ -1,6 +1,6 @@
 //! The table of joint outcomes of a system, for inspection and for decisions.
 
-use crate::criterion::most_probable;
+use crate::criterion::{equivocation, most_probable};
 use crate::error::{Error, refuse};
 use crate::law::Reports;
 use crate::observation_model::ObservationModel;
@@ -146,26 +146,7 @@ impl JointTable {
         if !self.model().is_discrete() {
             return refuse("prior", "a continuous prior", "a discrete prior for a conditional entropy");
         }
-        let mut total = 0.0;
-        for outcome in 0..self.outcomes() {
-            let mass = self.probability(outcome);
-            let best = self.decide(outcome);
-            if mass <= 0.0 {
-                continue;
-            }
-            let mut others = 0.0;
-            for (k, (w, q)) in self.model().weights().iter().zip(self.likelihood(outcome)).enumerate() {
-                let joint = w * q;
-                if k != best && joint > 0.0 {
-                    others += joint;
-                    // The quotient is at most 1; its inverse would overflow for the smallest numbers.
-                    total -= joint * (joint / mass).ln();
-                }
-            }
-            // -(1 - d) ln(1 - d) of the most probable value.
-            let d = others / mass;
-            total -= mass * (1.0 - d) * (-d).ln_1p();
-        }
-        Ok(total)
+        let outcomes = self.likelihood.chunks_exact(self.values().len());
+        Ok(outcomes.map(|q| equivocation(self.model().weights(), q)).sum())
     }
 }

@@ -8,7 +8,6 @@ use fewbits_core::Observation;
 use fewbits_numerics::error::{entries, positive, refuse};
 use fewbits_numerics::quadrature::gauss_legendre;
 use fewbits_quantizer_design::outcomes::{Feature, Table, explained, moments};
-use serde::{Deserialize, Serialize};
 
 /// Largest number of sensors: there are `2^N` cells.
 const MAX_SENSORS: usize = 16;
@@ -21,37 +20,16 @@ pub(crate) type Moments = (Vec<f64>, Vec<f64>);
 /// `N` sensors that send the `N` Gray code bits of `2^N` cells over `[-V, V]`, one bit each.
 ///
 /// The constructor computes every bit's probabilities for every sensor's noise, so that errors of assignments take little time.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredSensors")]
+#[derive(Debug, Clone, PartialEq)]
 pub struct CodedSensors {
-    #[serde(skip_serializing)]
     source: Source,
     half_width: f64,
     noise_deviations: Vec<f64>,
-    #[serde(skip_serializing)]
     quantizers: Vec<BinaryQuantizer>,
     /// Nodes on `[0, V]`, since the code is symmetric except for its first bit.
-    #[serde(skip_serializing)]
     pub(crate) nodes: Nodes,
     /// Probabilities of the bit's two values at the nodes: `[bit][sensor]`.
-    #[serde(skip_serializing)]
     pub(crate) probability: Vec<Vec<Table>>,
-}
-
-/// The stored form of [`CodedSensors`].
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredSensors {
-    half_width: f64,
-    noise_deviations: Vec<f64>,
-}
-
-impl TryFrom<StoredSensors> for CodedSensors {
-    type Error = Error;
-
-    fn try_from(parts: StoredSensors) -> Result<Self, Error> {
-        CodedSensors::with_deviations(parts.half_width, &parts.noise_deviations)
-    }
 }
 
 impl CodedSensors {
@@ -308,9 +286,6 @@ mod tests {
             let pair = 2.0 * (2.0 * f64::from(cell / 2) + 1.0 - 4.0) / 4.0;
             assert!((sensors.decode(&order, &seen).unwrap() - pair).abs() < 1e-2);
         }
-        let json = serde_json::to_string(&sensors).unwrap();
-        assert_eq!(serde_json::from_str::<CodedSensors>(&json).unwrap(), sensors);
-        assert!(serde_json::from_str::<CodedSensors>(r#"{"half_width":1.0,"noise_deviations":[0.1,-0.1]}"#).is_err());
     }
 
     #[test]

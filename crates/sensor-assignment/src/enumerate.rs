@@ -186,10 +186,8 @@ impl Half {
                 .clone()
                 .zip(&order)
                 .map(|(bit, &sensor)| &sensors.probability[bit][sensor]);
-            values.extend_from_slice(
-                own.fold(Table::new(vec![1.0; nodes], nodes), |all, own| all.outer(own))
-                    .values(),
-            );
+            let ones = Table::new(vec![1.0; nodes], nodes);
+            values.extend(own.fold(ones, |all, own| all.outer(own)).values);
             orders.push(order);
         });
         let columns = DMatrix::from_vec(nodes, values.len() / nodes, values);
@@ -211,7 +209,7 @@ fn mmse_halves(sensors: &CodedSensors, tally: &mut Tally) {
         // Probabilities and first moments of all joint outcomes: a row for each of the first half, a column for the second.
         let [mass, moment] = features.each_ref().map(|feature| {
             let mut weighted = first.columns.clone();
-            for (mut row, w) in weighted.row_iter_mut().zip(feature.weights()) {
+            for (mut row, w) in weighted.row_iter_mut().zip(&feature.weights) {
                 row *= *w;
             }
             weighted.transpose() * &second.columns

@@ -31,7 +31,6 @@ mod cost;
 mod design;
 mod enumerate;
 mod linear;
-mod setup;
 
 pub use coded::CodedSensors;
 pub use cost::{bit_error, flipped_estimate, pair_costs, quantization_error};
@@ -39,4 +38,3 @@ pub use design::bit_per_sensor;
 pub use enumerate::{AllErrors, Estimator, Exchanged, all_errors, exchange};
 pub use fewbits_quantizer_design::Error;
 pub use linear::{CostMatrix, DualCertificate};
-pub use setup::{by_precision, variances_with_moments};

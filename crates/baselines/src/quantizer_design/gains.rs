@@ -91,7 +91,7 @@ fn level_gains<'a>(
     channel: &Channel,
     log_likelihood: impl Fn(usize) -> &'a [f64],
 ) -> Table {
-    let (nodes, values) = (others.nodes(), model.values().len());
+    let (nodes, values) = (others.nodes, model.values().len());
     let mut per_symbol = vec![0.0; channel.outputs() * nodes];
     let mut score = vec![0.0; values];
     for at in 0..others.rows() * channel.outputs() {
@@ -101,12 +101,8 @@ fn level_gains<'a>(
         let out = &mut per_symbol[symbol * nodes..(symbol + 1) * nodes];
         for ((feature, w), s) in model.given().iter().zip(model.weights()).zip(&score) {
             let factor = w * s;
-            let range = feature.start()..feature.start() + feature.weights().len();
-            for ((out, p), report) in out[range.clone()]
-                .iter_mut()
-                .zip(feature.weights())
-                .zip(&reports[range])
-            {
+            let range = feature.start..feature.start + feature.weights.len();
+            for ((out, p), report) in out[range.clone()].iter_mut().zip(&feature.weights).zip(&reports[range]) {
                 *out += factor * p * report;
             }
         }

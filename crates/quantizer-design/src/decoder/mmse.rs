@@ -3,9 +3,9 @@
 use crate::error::{Error, refuse};
 use crate::law::{Reports, symbol_tables};
 use crate::observation_model::ObservationModel;
-use crate::outcomes::{Feature, Table, dot};
+use crate::outcomes::Table;
 use crate::system::System;
-use crate::table::{JointTable, Layout};
+use crate::table::Layout;
 use fewbits_core::Observation;
 use fewbits_numerics::error::entries;
 use fewbits_quantizers::Symbol;
@@ -80,13 +80,8 @@ impl MmseDecoder {
         let allowed = system
             .clone()
             .with_outcome_limit(system.outcome_limit().max(limit as u64));
-        let entries = match JointTable::new(&allowed) {
-            Ok(table) => (0..table.outcomes())
-                .map(|outcome| posterior(model, table.likelihood(outcome)))
-                .collect(),
-            Err(Error::TooLarge { .. }) => Self::entries_by_moments(model, &Reports::of(&allowed)?),
-            Err(error) => return Err(error),
-        };
+        let mut entries = Vec::new();
+        Reports::of(&allowed)?.for_each(|product| entries.push(posterior(model, product)));
         Ok(Self {
             layout: Layout::new(system),
             system: system.clone(),
@@ -94,26 +89,6 @@ impl MmseDecoder {
             entries,
             symbols: symbol_tables(system)?,
         })
-    }
-
-    /// Variances as differences of moments about the prior mean; used if a table of all likelihoods would be too large.
-    fn entries_by_moments(model: &ObservationModel, reports: &Reports) -> Vec<[f64; 3]> {
-        let mut square = vec![0.0; model.nodes()];
-        for ((given, w), x) in model.given.iter().zip(&model.weights).zip(&model.values) {
-            for (i, p) in given.weights.iter().enumerate() {
-                square[given.start + i] += w * (x - model.mean) * (x - model.mean) * p;
-            }
-        }
-        let features = [model.mass.clone(), model.moment.clone(), Feature::of_all(square)];
-        let entry = |m: &[f64]| {
-            if m[0] > 0.0 {
-                let off = m[1] / m[0];
-                [m[0], model.mean + off, (m[2] / m[0] - off * off).max(0.0)]
-            } else {
-                [0.0, model.mean, model.variance]
-            }
-        };
-        reports.moments(&features).chunks_exact(3).map(entry).collect()
     }
 
     /// Number of entries, one per joint outcome.
@@ -154,12 +129,7 @@ impl MmseDecoder {
                 }
             }
         }
-        let q: Vec<f64> = model
-            .given
-            .iter()
-            .map(|f| dot(&f.weights, &product[f.start..f.start + f.weights.len()]))
-            .collect();
-        Self::estimate(posterior(model, &q))
+        Self::estimate(posterior(model, &product))
     }
 
     /// The estimate if symbol `symbols[n]` was received from sensor `n`.
@@ -179,9 +149,10 @@ impl MmseDecoder {
     }
 }
 
-/// Probability, posterior mean and variance from the likelihoods of the values, computed as sums of positive terms.
+/// Probability, posterior mean and variance from the likelihood at the nodes, computed as sums of positive terms.
 fn posterior(model: &ObservationModel, likelihood: &[f64]) -> [f64; 3] {
-    let terms = || model.weights.iter().zip(likelihood).zip(&model.values);
+    let given: Vec<f64> = model.given.iter().map(|feature| feature.of(likelihood)).collect();
+    let terms = || model.weights.iter().zip(&given).zip(&model.values);
     let mass: f64 = terms().map(|((w, q), _)| w * q).sum();
     if mass <= 0.0 {
         return [0.0, model.mean, model.variance];

@@ -1,6 +1,6 @@
 //! Sums over nodes of products of per-group tables. Most of the computing time is spent here.
 
-use super::table::{Feature, Table};
+use super::table::{Feature, Table, dot};
 use crate::deadline::Deadline;
 use std::ops::ControlFlow;
 
@@ -15,20 +15,6 @@ pub fn explained(mass: f64, moment: f64) -> f64 {
     } else {
         0.0
     }
-}
-
-/// Inner product with four independent sums, which the compiler vectorises.
-#[inline]
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in a4.zip(b4) {
-        for i in 0..4 {
-            sums[i] += x[i] * y[i];
-        }
-    }
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
 /// [`dot`] of `a` with four rows, with the same bits; `a` is read only once.

@@ -5,6 +5,8 @@ use crate::error::Error;
 use crate::observation_model::ObservationModel;
 use crate::system::{SensorGroup, System};
 use fewbits_core::Link;
+use fewbits_numerics::error::entries;
+use fewbits_quantizers::quantizer::check_increasing;
 use fewbits_quantizers::{Channel, Quantizer, lloyd_max};
 
 /// A sensor that takes part.
@@ -50,14 +52,22 @@ pub(super) fn missing(link: &Link) -> f64 {
     link.loss() + link.erasure()
 }
 
-/// Breakpoints of the cells of a sensor, and the word of each.
+/// The cells of a sensor with their words.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct WordedCells {
-    pub(super) breakpoints: Vec<f64>,
-    pub(super) words: Vec<usize>,
+pub struct WordedCells {
+    /// Breakpoints between the cells, increasing.
+    pub breakpoints: Vec<f64>,
+    /// Word of each cell, one more than breakpoints.
+    pub words: Vec<usize>,
 }
 
 impl WordedCells {
+    /// An error unless breakpoints increase and there is a word for each cell.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        check_increasing(&self.breakpoints)?;
+        Ok(entries("words", self.words.len(), self.breakpoints.len() + 1)?)
+    }
+
     /// The cells of a grid, with runs of equal words joined.
     pub(super) fn of(edges: &[f64], words: &[usize]) -> Self {
         let changes: Vec<usize> = (1..words.len()).filter(|c| words[*c] != words[c - 1]).collect();

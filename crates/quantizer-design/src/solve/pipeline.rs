@@ -33,6 +33,7 @@ impl Request<'_> {
     /// Bits of every sensor.
     fn checked_bits(&self, control: &mut Control<'_>) -> Result<Vec<u32>, Error> {
         let sensors = self.model.sensors();
+        entries("links", self.links.len(), sensors)?;
         let bits = match &self.bits {
             BitBudget::Each(bits) => vec![*bits; sensors],
             BitBudget::PerSensor(bits) => bits.clone(),
@@ -49,7 +50,11 @@ impl Request<'_> {
             return refuse("bits", bits, format!("at most {MAX_BITS} bits per sensor"));
         }
         // The words of a given start must fit the bits of their sensors.
+        if let Some(start) = &self.start {
+            entries("start", start.len(), sensors)?;
+        }
         for (bits, cells) in bits.iter().zip(self.start.iter().flatten()) {
+            cells.check()?;
             if let Some(word) = cells.words.iter().find(|w| **w >= 1 << bits) {
                 return refuse("word", word, format!("a word of {bits} bits"));
             }

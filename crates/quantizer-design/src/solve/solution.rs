@@ -228,18 +228,6 @@ impl Solution {
             .collect()
     }
 
-    /// The words of each sensor for many samples: a column per sensor, in the order of [`Solution::sensors`].
-    ///
-    /// # Errors
-    /// If there is not one column per sensor, or a sample is NaN.
-    pub fn encode_columns(&self, samples: &[&[f64]]) -> Result<Vec<Vec<usize>>, Error> {
-        entries("samples", samples.len(), self.sensors.len())?;
-        let columns = self.sensors.iter().zip(samples);
-        columns
-            .map(|(sensor, column)| column.iter().map(|y| sensor.encode(*y)).collect())
-            .collect()
-    }
-
     /// The decoder of least squared error, a table of at most `limit` entries.
     ///
     /// # Errors
@@ -249,10 +237,7 @@ impl Solution {
     }
 
     pub(super) fn with_cells(&self, cells: Vec<WordedCells>) -> Result<Self, Error> {
-        for cells in &cells {
-            fewbits_quantizers::quantizer::check_increasing(&cells.breakpoints)?;
-            entries("breakpoints", cells.breakpoints.len(), cells.words.len() - 1)?;
-        }
+        cells.iter().try_for_each(WordedCells::check)?;
         let participants = self.participants();
         let apart = self.system.groups().len() == self.sensors.len();
         let system = system_of(self.system.model(), &participants, &cells, apart)?;

@@ -96,8 +96,12 @@ fn searches_know_no_unit() {
         Design { iterations: 0, ..best }
     });
     let folded = |s: f64| {
-        let request = Request::estimation(equal_pair(0.85, s), BitBudget::Each(1), Link::PERFECT);
-        let found = request.with_cells(AllowedCells::Any).with_starts(6).run().unwrap();
+        let request = Request {
+            cells: AllowedCells::Any,
+            starts: 6,
+            ..Request::estimation(equal_pair(0.85, s), BitBudget::Each(1), Link::PERFECT)
+        };
+        let found = request.run().unwrap();
         found.best().value / (s * s)
     };
     let one = folded(1.0);
@@ -267,9 +271,8 @@ fn nodes_of_a_density_are_estimated_not_guessed() {
         found.best().clone()
     });
     assert!((estimated.value / exact.value - 1.0).abs() < 1e-3, "{} {}", estimated.value, exact.value);
-    let request = Request::detection(nodes, BitBudget::Each(1), Link::PERFECT)
-        .unwrap()
-        .with_starts(4);
+    let mut request = Request::detection(nodes, BitBudget::Each(1), Link::PERFECT).unwrap();
+    request.starts = 4;
     let guessed = request.run().unwrap().best().clone();
     assert!(estimated.value < guessed.mean_squared_error().unwrap());
     assert!(guessed.value < estimated.system().value(Criterion::BayesError).unwrap());
