@@ -2,9 +2,10 @@
 
 use crate::criterion::{equivocation, most_probable};
 use crate::error::{Error, refuse};
-use crate::law::Reports;
+use crate::law::report_tables;
 use crate::observation_model::ObservationModel;
 use crate::outcomes::counts::rank;
+use crate::outcomes::moments;
 use crate::system::System;
 use fewbits_numerics::error::entries;
 
@@ -62,7 +63,6 @@ pub struct JointTable {
     layout: Layout,
     /// Outcomes by values.
     likelihood: Vec<f64>,
-    log_multiplicity: Vec<f64>,
 }
 
 impl JointTable {
@@ -73,12 +73,10 @@ impl JointTable {
     pub fn new(system: &System) -> Result<Self, Error> {
         let needed = system.outcomes().saturating_mul(system.model().values().len() as u64);
         Error::at_most("joint outcome table", needed, ENTRY_LIMIT)?;
-        let reports = Reports::of(system)?;
         Ok(Self {
             layout: Layout::new(system),
             system: system.clone(),
-            likelihood: reports.moments(&system.model().given),
-            log_multiplicity: reports.log_multiplicity,
+            likelihood: moments(&report_tables(system)?, &system.model().given),
         })
     }
 
@@ -93,7 +91,7 @@ impl JointTable {
 
     /// Number of outcomes.
     pub fn outcomes(&self) -> usize {
-        self.log_multiplicity.len()
+        self.likelihood.len() / self.values().len()
     }
 
     /// Values of the unknown, the columns of the table.
@@ -109,16 +107,10 @@ impl JointTable {
         self.layout.index(symbols)
     }
 
-    /// `P(outcome | x_k)` for all `k`; sums to 1 over outcomes. An outcome does not say which sensor of a group sent what: divide by the
-    /// [`multiplicity`](Self::multiplicity) for one particular report.
+    /// `P(outcome | x_k)` for all `k`; sums to 1 over outcomes. An outcome does not say which sensor of a group sent what.
     pub fn likelihood(&self, outcome: usize) -> &[f64] {
         let values = self.model().values().len();
         self.likelihood.chunks_exact(values).nth(outcome).unwrap_or_default()
-    }
-
-    /// Number of different reports of individual sensors that give this outcome.
-    pub fn multiplicity(&self, outcome: usize) -> f64 {
-        self.log_multiplicity.get(outcome).map_or(0.0, |l| l.exp().round())
     }
 
     /// Prior probability of an outcome.

@@ -1,9 +1,9 @@
 //! The posterior mean as a look-up table.
 
 use crate::error::{Error, refuse};
-use crate::law::{Reports, symbol_tables};
+use crate::law::{report_tables, symbol_tables};
 use crate::observation_model::ObservationModel;
-use crate::outcomes::Table;
+use crate::outcomes::{Table, for_each};
 use crate::system::System;
 use crate::table::Layout;
 use fewbits_core::Observation;
@@ -81,7 +81,8 @@ impl MmseDecoder {
             .clone()
             .with_outcome_limit(system.outcome_limit().max(limit as u64));
         let mut entries = Vec::new();
-        Reports::of(&allowed)?.for_each(|product| entries.push(posterior(model, product)));
+        let visit = |_, product: &[f64]| entries.push(posterior(model, product));
+        for_each(&report_tables(&allowed)?, &vec![1.0; model.nodes()], visit);
         Ok(Self {
             layout: Layout::new(system),
             system: system.clone(),

@@ -178,7 +178,7 @@ impl System {
     }
 
     /// Largest number of joint outcomes that a computation may enumerate.
-    pub(crate) fn outcome_limit(&self) -> u64 {
+    pub fn outcome_limit(&self) -> u64 {
         self.outcome_limit
     }
 

@@ -360,7 +360,7 @@ fn impossible_requests_are_named() {
             .to_string()
             .contains("single sensor")
     );
-    assert!(design::greedy(&counted, &[0], MI, &Newton::default()).is_err());
+    assert!(baselines::greedy(&counted, &[0], MI, &Newton::default()).is_err());
     assert!(baselines::alternating_step(&counted, 0, MI).is_err());
     let many = System::ideal(ObservationModel::gaussian_with_deviations(1.0, &[1.0; 11]).unwrap(), vec![q.clone(); 11])
         .unwrap();

@@ -295,7 +295,7 @@ fn pair(entry: &Entry) {
     let sample = lloyd_of(&|n| model.sample_deviation(n));
     let criterion = criterion(id);
     let last = |order: &[usize]| {
-        design::greedy(&sample, order, criterion, &plain)
+        baselines::greedy(&sample, order, criterion, &plain)
             .unwrap()
             .pop()
             .unwrap()
@@ -344,7 +344,7 @@ fn nine_sensors(entry: &Entry) {
     if entry.id.contains("greedy") {
         let start = System::ideal(model, vec![lloyd(4, 1.4); n]).unwrap();
         let order: Vec<usize> = (0..n - 1).collect();
-        let stages = design::greedy(&start, &order, criterion, &Newton::default()).unwrap();
+        let stages = baselines::greedy(&start, &order, criterion, &Newton::default()).unwrap();
         let rows = rows(&entry.value);
         let mut quantizers = Vec::new();
         for (design, row) in stages.iter().zip(&rows) {
@@ -414,7 +414,7 @@ fn detection(entry: &Entry) {
     }
     if kind == "MIgreedy" {
         let start = System::ideal(model(5), vec![about(1.0); 5]).unwrap();
-        let design = design::greedy(&start, &[0, 1, 2, 3, 4], MI, &newton)
+        let design = baselines::greedy(&start, &[0, 1, 2, 3, 4], MI, &newton)
             .unwrap()
             .pop()
             .unwrap();
@@ -494,7 +494,7 @@ fn pair_over_bsc(entry: &Entry) {
     let start = over(&bsc(labels, number(&entry.inputs["eps"])), &start);
     let criterion = criterion(&entry.id);
     let design = if entry.id.contains("greedy") {
-        design::greedy(&start, &[0, 1], criterion, &Newton::default())
+        baselines::greedy(&start, &[0, 1], criterion, &Newton::default())
             .unwrap()
             .pop()
             .unwrap()

@@ -55,7 +55,7 @@ fn joint_and_greedy_designs_know_no_unit() {
             let start = |scale: f64| System::lloyd_max(pair(rho, scale), 4).unwrap();
             law(criterion, 1e-8, |s| design::joint(&start(s), criterion, &newton).unwrap());
             law(criterion, 1e-8, |s| {
-                design::greedy(&start(s), &[1, 0], criterion, &newton)
+                baselines::greedy(&start(s), &[1, 0], criterion, &newton)
                     .unwrap()
                     .pop()
                     .unwrap()
