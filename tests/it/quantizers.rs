@@ -159,7 +159,11 @@ fn no_design_beats_a_bound() {
         let words = Labelling::natural(levels).unwrap();
         let channel = Channel::binary_symmetric_with_gaps(&words, crossover).unwrap();
         let start = lloyd(levels, model.sample_deviation(0));
-        let group = SensorGroup::new(start, channel, (0..model.sensors()).collect()).unwrap();
+        let group = SensorGroup {
+            quantizer: start,
+            channel,
+            sensors: (0..model.sensors()).collect(),
+        };
         let design = joint(&System::new(model, vec![group]).unwrap(), MSE);
         assert!(design.value > bound.distortion, "{row}");
         if crossover == 0.0 {
@@ -204,7 +208,11 @@ fn nine_sensors_in_different_groups_return_to_one_quantizer() {
                 let quantizer = lloyd(levels, 1.4).affine(shift, 1.0 + 0.4 * shift).unwrap();
                 let own = (first..first + size).collect();
                 first += size;
-                SensorGroup::new(quantizer, Channel::ideal(levels).unwrap(), own).unwrap()
+                SensorGroup {
+                    quantizer,
+                    channel: Channel::ideal(levels).unwrap(),
+                    sensors: own,
+                }
             };
             let groups = sizes.iter().enumerate().map(group).collect();
             let end = joint(&System::new(sensors(9), groups).unwrap(), criterion).quantizers();

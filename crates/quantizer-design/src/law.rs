@@ -37,16 +37,16 @@ impl<'a> Active<'a> {
     /// If there is no such group.
     pub fn new(system: &'a System, index: usize) -> Result<Self, Error> {
         let group = system.group(index)?;
-        let outputs = group.channel().outputs();
-        let (means, deviation) = system.model().sample_law(group.sensors()[0]);
-        let exchange = (0..group.quantizer().breakpoints().len())
+        let outputs = group.channel.outputs();
+        let (means, deviation) = system.model().sample_law(group.sensors[0]);
+        let exchange = (0..group.quantizer.breakpoints().len())
             .map(|i| {
                 (0..outputs)
                     .map(|t| group.cell_transition(t, i) - group.cell_transition(t, i + 1))
                     .collect()
             })
             .collect();
-        let compositions = Compositions::new(group.sensors().len(), outputs);
+        let compositions = Compositions::new(group.sensors.len(), outputs);
         Ok(Self {
             index,
             group,
@@ -64,7 +64,7 @@ impl<'a> Active<'a> {
 
     /// The breakpoints of the group in the system.
     pub fn breakpoints(&self) -> &'a [f64] {
-        self.group.quantizer().breakpoints()
+        self.group.quantizer.breakpoints()
     }
 
     /// Probability of each cell at each node.

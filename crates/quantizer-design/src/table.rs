@@ -24,7 +24,7 @@ impl Layout {
         let groups = system.groups();
         let entries = groups
             .iter()
-            .map(|g| (g.sensors().to_vec(), g.channel().outputs(), g.outcomes() as usize));
+            .map(|g| (g.sensors.to_vec(), g.channel.outputs(), g.outcomes() as usize));
         Self {
             groups: entries.collect(),
             sensors: system.model().sensors(),

@@ -23,11 +23,11 @@ pub fn greedy(system: &System, order: &[usize], criterion: Criterion, newton: &N
         let (mut quantizers, mut channels) = (Vec::new(), Vec::new());
         for (stage, g) in chain.iter().enumerate() {
             let group = single_sensor(system, *g)?;
-            sensors.push(group.sensors()[0]);
+            sensors.push(group.sensors[0]);
             // Earlier sensors keep their design; only the last one is optimised.
             let designed = stages.last().and_then(|d| d.system.groups().get(stage));
-            quantizers.push(designed.unwrap_or(group).quantizer().clone());
-            channels.push(group.channel().clone());
+            quantizers.push(designed.unwrap_or(group).quantizer.clone());
+            channels.push(group.channel.clone());
         }
         let model = system.model().subset(&sensors)?;
         let partial = System::distinct(model, quantizers, channels)?.with_outcome_limit(system.outcome_limit());

@@ -118,7 +118,7 @@ impl MmseDecoder {
         entries("observations", observations.len(), model.sensors())?;
         let mut product = vec![1.0; model.nodes()];
         for (group, symbols) in self.system.groups().iter().zip(&self.symbols) {
-            for symbol in group.sensors().iter().filter_map(|n| observations[*n].received()) {
+            for symbol in group.sensors.iter().filter_map(|n| observations[*n].received()) {
                 if symbol.0 >= symbols.rows() {
                     return refuse("symbol", symbol.0, format!("a number below {}", symbols.rows()));
                 }

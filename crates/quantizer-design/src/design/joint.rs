@@ -189,7 +189,7 @@ fn breakpoint_scale(system: &System, groups: &[usize]) -> f64 {
     groups
         .iter()
         .filter_map(|g| system.groups().get(*g))
-        .map(|g| system.model().sample_deviation(g.sensors()[0]))
+        .map(|g| system.model().sample_deviation(g.sensors[0]))
         .fold(f64::INFINITY, f64::min)
 }
 
@@ -248,15 +248,15 @@ fn random_system(system: &System, stream: Stream) -> Result<System, Error> {
         .groups()
         .iter()
         .map(|group| {
-            let spread = 1.3 * system.model().sample_deviation(group.sensors()[0]);
+            let spread = 1.3 * system.model().sample_deviation(group.sensors[0]);
             let mut b: Vec<f64> = group
-                .quantizer()
+                .quantizer
                 .breakpoints()
                 .iter()
                 .map(|_| mean + spread * normal::quantile(rng.random_range(0.02..0.98)))
                 .collect();
             b.sort_by(f64::total_cmp);
-            group.quantizer().with_breakpoints(b)
+            group.quantizer.with_breakpoints(b)
         })
         .collect::<Result<Vec<_>, _>>()?;
     system.with_quantizers(quantizers)

@@ -139,7 +139,7 @@ impl Problem<'_> {
     ) -> Derivatives {
         let mass = &self.system.model().mass.weights;
         let (n, nodes) = (a.parameters(), mass.len());
-        let sensors = a.group.sensors().len() as f64;
+        let sensors = a.group.sensors.len() as f64;
         let mut gradient = DVector::zeros(n);
         let mut hessian = DMatrix::zeros(n, n);
         let mut worth = vec![0.0; nodes];

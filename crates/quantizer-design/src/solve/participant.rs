@@ -147,9 +147,13 @@ pub(super) fn system_of(
     }
     let groups = groups.into_iter().map(|sensors| {
         let (quantizer, channel) = parts_of(model, &laws[sensors[0]], &cells[sensors[0]])?;
-        SensorGroup::new(quantizer, channel, sensors)
+        Ok(SensorGroup {
+            quantizer,
+            channel,
+            sensors,
+        })
     });
-    System::new(model.clone(), groups.collect::<Result<_, _>>()?)
+    System::new(model.clone(), groups.collect::<Result<_, Error>>()?)
 }
 
 /// Quantizer and channel of one sensor. A sensor with a single cell gets a second cell with the same word.

@@ -62,10 +62,17 @@ fn grouped() -> impl Strategy<Value = System> {
             Noise::independent_with_deviations(&[sd, sd, sd, 0.8])
         };
         let model = ObservationModel::new(prior, noise.unwrap()).unwrap();
-        let three =
-            SensorGroup::new(Quantizer::new(a).unwrap(), Channel::symbol_erasure(3, loss).unwrap(), vec![0, 1, 2]);
-        let one = SensorGroup::new(Quantizer::new(b).unwrap(), Channel::ideal(2).unwrap(), vec![3]);
-        System::new(model, vec![three.unwrap(), one.unwrap()]).unwrap()
+        let three = SensorGroup {
+            quantizer: Quantizer::new(a).unwrap(),
+            channel: Channel::symbol_erasure(3, loss).unwrap(),
+            sensors: vec![0, 1, 2],
+        };
+        let one = SensorGroup {
+            quantizer: Quantizer::new(b).unwrap(),
+            channel: Channel::ideal(2).unwrap(),
+            sensors: vec![3],
+        };
+        System::new(model, vec![three, one]).unwrap()
     })
 }
 
@@ -143,7 +150,7 @@ proptest! {
     fn mirrors_and_swaps_change_nothing(system in pair()) {
         let mirror = system.quantizers().iter().map(Quantizer::mirrored).collect();
         let mirrored_words = Labelling::new(vec![3, 2, 1, 0]).unwrap();
-        let [a, b] = [0, 1].map(|g| system.groups()[g].channel().clone());
+        let [a, b] = [0, 1].map(|g| system.groups()[g].channel.clone());
         // Natural words in reverse order are their complements: the same binary channel.
         prop_assert!((mirrored_words.word(0), mirrored_words.word(3)) == (Some(3), Some(0)));
         let mirrored = system.with_quantizers(mirror).unwrap();
@@ -166,9 +173,8 @@ proptest! {
             system
                 .groups()
                 .iter()
-                .flat_map(|g| g.sensors().iter().map(move |n| SensorGroup::new(g.quantizer().clone(), g.channel().clone(), vec![*n])))
-                .collect::<Result<_, _>>()
-                .unwrap(),
+                .flat_map(|g| g.sensors.iter().map(move |n| SensorGroup { sensors: vec![*n], ..g.clone() }))
+                .collect(),
         ).unwrap();
         for criterion in [MI, MSE] {
             prop_assert!((system.value(criterion).unwrap() - apart.value(criterion).unwrap()).abs() < 1e-12);
@@ -204,10 +210,13 @@ proptest! {
     fn derivatives_of_bayes_errors_agree_with_differences(b in breakpoints(3), theta in 0.5..3.0f64, prior in 0.2..0.8f64) {
         let noise = Noise::independent_with_deviations(&[1.0, 1.0, 0.7]).unwrap();
         let model = ObservationModel::new(Prior::binary(theta, prior).unwrap(), noise).unwrap();
-        let q = Quantizer::new(b).unwrap();
-        let ideal = Channel::ideal(4).unwrap();
-        let pair = SensorGroup::new(q.clone(), ideal.clone(), vec![0, 1]).unwrap();
-        let system = System::new(model, vec![pair, SensorGroup::new(q, ideal, vec![2]).unwrap()]).unwrap();
+        let one = SensorGroup {
+            quantizer: Quantizer::new(b).unwrap(),
+            channel: Channel::ideal(4).unwrap(),
+            sensors: vec![2],
+        };
+        let pair = SensorGroup { sensors: vec![0, 1], ..one.clone() };
+        let system = System::new(model, vec![pair, one]).unwrap();
         let decisions = |s: &System| {
             let table = JointTable::new(s).unwrap();
             (0..table.outcomes()).map(|t| table.decide(t)).collect::<Vec<_>>()

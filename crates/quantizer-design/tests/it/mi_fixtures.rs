@@ -2,7 +2,6 @@
 
 use fewbits_baselines::quantizer_design::{self as baselines, Separation};
 use fewbits_quantizer_design::design::{self, Design};
-use fewbits_quantizer_design::system::SensorGroup;
 use fewbits_quantizer_design::table::JointTable;
 use fewbits_quantizer_design::{
     Channel, Criterion, Labelling, Newton, Noise, ObservationModel, Prior, Quantizer, System, bounds, canonical,
@@ -547,19 +546,14 @@ fn alternating_series(entry: &Entry) {
         let stage = row[1] as usize;
         if row[2] > 0.0 {
             let quantizer = if stage == 1 {
-                let first = both.groups()[0].clone();
-                let alone = both.model().subset(&[0]).unwrap();
-                let group = SensorGroup::new(first.quantizer().clone(), first.channel().clone(), vec![0]).unwrap();
-                baselines::alternating_step(&System::new(alone, vec![group]).unwrap(), 0, MI).unwrap()
+                baselines::alternating_step(&both.subset(&[0]).unwrap(), 0, MI).unwrap()
             } else {
                 baselines::alternating_step(&both, 1, MI).unwrap()
             };
             both = both.with_quantizer(stage - 1, quantizer).unwrap();
         }
-        let first = &both.groups()[0];
-        let group = SensorGroup::new(first.quantizer().clone(), first.channel().clone(), vec![0]).unwrap();
-        let alone = System::new(both.model().subset(&[0]).unwrap(), vec![group]).unwrap();
-        let outer = |g: usize| both.groups()[g].quantizer().breakpoints()[2];
+        let alone = both.subset(&[0]).unwrap();
+        let outer = |g: usize| both.groups()[g].quantizer.breakpoints()[2];
         let values = [
             alone.value(MI).unwrap(),
             both.value(MI).unwrap(),
