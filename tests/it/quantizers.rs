@@ -17,7 +17,7 @@ const MSE: Criterion = Criterion::MeanSquaredError;
 fn pair(sd: f64, rho: f64) -> ObservationModel {
     use fewbits::quantizer_design::{Noise, Prior};
     let noise = Noise::equicorrelated_with_deviations(&[sd; 2], rho).unwrap();
-    ObservationModel::new(Prior::gaussian_with_deviation(1.0).unwrap(), noise).unwrap()
+    ObservationModel::new(Prior::normal(0.0, 1.0).unwrap(), noise).unwrap()
 }
 
 fn sensors(count: usize) -> ObservationModel {

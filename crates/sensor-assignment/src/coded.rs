@@ -15,7 +15,7 @@ const MAX_SENSORS: usize = 16;
 const PANEL: f64 = 2.0;
 
 /// The first two moments of `u` at the nodes; for `u` see [`CodedSensors::centre_mse`].
-pub(crate) type Moments = (Vec<f64>, Vec<f64>);
+pub type Moments = (Vec<f64>, Vec<f64>);
 
 /// `N` sensors that send the `N` Gray code bits of `2^N` cells over `[-V, V]`, one bit each.
 ///
@@ -27,9 +27,11 @@ pub struct CodedSensors {
     noise_deviations: Vec<f64>,
     quantizers: Vec<BinaryQuantizer>,
     /// Nodes on `[0, V]`, since the code is symmetric except for its first bit.
-    pub(crate) nodes: Nodes,
+    #[doc(hidden)]
+    pub nodes: Nodes,
     /// Probabilities of the bit's two values at the nodes: `[bit][sensor]`.
-    pub(crate) probability: Vec<Vec<Table>>,
+    #[doc(hidden)]
+    pub probability: Vec<Vec<Table>>,
 }
 
 impl CodedSensors {
@@ -138,7 +140,8 @@ impl CodedSensors {
     }
 
     /// Weights of probability and first moment. The nodes cover one side, with the weight of both.
-    pub(crate) fn features(&self) -> [Feature; 2] {
+    #[doc(hidden)]
+    pub fn features(&self) -> [Feature; 2] {
         let mass: Vec<f64> = self.nodes.w.iter().map(|w| 0.5 * w).collect();
         let moment = mass.iter().zip(&self.nodes.x).map(|(w, x)| w * x).collect();
         [Feature::of_all(mass), Feature::of_all(moment)]
@@ -189,7 +192,8 @@ impl CodedSensors {
 
     /// One step of the recursion of [`centre_mse`](Self::centre_mse).
     #[inline]
-    pub(crate) fn push_bit(&self, bit: usize, sensor: usize, (m1, m2): &Moments, next: &mut Moments) {
+    #[doc(hidden)]
+    pub fn push_bit(&self, bit: usize, sensor: usize, (m1, m2): &Moments, next: &mut Moments) {
         let p = &self.probability[bit][sensor];
         let (p0, p1) = (p.row(0), p.row(1));
         let from = m1.iter().zip(m2).zip(p0.iter().zip(p1));
@@ -199,7 +203,9 @@ impl CodedSensors {
         }
     }
 
-    pub(crate) fn centre_error(&self, (m1, m2): &Moments) -> f64 {
+    /// Error of the centre decoder, given the moments of `u` after all bits.
+    #[doc(hidden)]
+    pub fn centre_error(&self, (m1, m2): &Moments) -> f64 {
         let v = self.half_width;
         let mut sum = 0.0;
         for (((m1, m2), x), w) in m1.iter().zip(m2).zip(&self.nodes.x).zip(&self.nodes.w) {
@@ -211,7 +217,7 @@ impl CodedSensors {
 
 /// What an outcome of the other bits explains, given probability and first moment with the first bit 0 and with it 1, from one side of the
 /// axis. Reflecting `x` inverts the first bit and no other, so the two values are mirror images and explain the same.
-pub(crate) fn explained_by_pair(sums: &[f64]) -> f64 {
+pub fn explained_by_pair(sums: &[f64]) -> f64 {
     2.0 * explained(sums[0] + sums[2], sums[1] - sums[3])
 }
 

@@ -146,9 +146,23 @@ impl DualCertificate {
 
 #[cfg(test)]
 mod tests {
-    use super::super::enumerate::for_permutations;
     use super::*;
     use proptest::prelude::*;
+
+    /// Visits all permutations of `0..n`.
+    fn for_permutations(n: usize, mut visit: impl FnMut(&[usize])) {
+        let mut all = vec![Vec::new()];
+        for _ in 0..n {
+            let longer = |p: Vec<usize>| {
+                (0..n)
+                    .filter(|i| !p.contains(i))
+                    .map(|i| [p.as_slice(), &[i]].concat())
+                    .collect::<Vec<_>>()
+            };
+            all = all.into_iter().flat_map(longer).collect();
+        }
+        all.iter().for_each(|p| visit(p));
+    }
 
     fn least(costs: &CostMatrix) -> f64 {
         let mut best = f64::INFINITY;

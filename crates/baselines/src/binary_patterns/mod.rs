@@ -7,7 +7,6 @@ mod decoders;
 mod information;
 mod luo;
 mod multi_threshold;
-mod rate_distortion;
 mod strategies;
 
 pub use adaptive::{AdaptiveErrors, AdaptiveRule, adaptive, bounded_mle};
@@ -15,7 +14,6 @@ pub use decoders::Decoder;
 pub use information::printed_crlb;
 pub use luo::{Luo, LuoErrors};
 pub use multi_threshold::{MultiThreshold, multi_threshold_bound};
-pub use rate_distortion::{RemoteDistortion, network_rate_distortion, remote_distortion};
 pub use strategies::{by_information, tile};
 
 use fewbits_binary_patterns::Error;

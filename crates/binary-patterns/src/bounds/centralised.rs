@@ -1,6 +1,6 @@
 //! The smallest error that `N` bits allow if one encoder sees all measurements.
 
-use super::conditional_mean::ConditionalMean;
+use super::rate_distortion::ConditionalMean;
 use crate::Error;
 use crate::Source;
 use fewbits_numerics::error::{at_least_one, positive, refuse};

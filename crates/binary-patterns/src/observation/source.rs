@@ -41,7 +41,7 @@ impl TryFrom<&Source> for Prior {
     fn try_from(source: &Source) -> Result<Self, Error> {
         match source.kind {
             Kind::Uniform { half_width } => Self::uniform(-half_width, half_width),
-            Kind::Gaussian { deviation } => Self::gaussian_with_deviation(deviation),
+            Kind::Gaussian { deviation } => Self::normal(0.0, deviation),
         }
     }
 }

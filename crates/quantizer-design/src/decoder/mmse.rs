@@ -197,7 +197,7 @@ mod tests {
     fn an_erased_symbol_leaves_the_posterior_of_the_others() {
         for rho in [0.0, 0.5] {
             let noise = Noise::equicorrelated_with_deviations(&[1.0; 3], rho).unwrap();
-            let model = ObservationModel::new(Prior::gaussian_with_deviation(1.0).unwrap(), noise).unwrap();
+            let model = ObservationModel::new(Prior::normal(0.0, 1.0).unwrap(), noise).unwrap();
             let q = Quantizer::symmetric(1.2).unwrap();
             let system = System::identical(model.clone(), q.clone()).unwrap();
             let decoder = MmseDecoder::new(&system, 20).unwrap();

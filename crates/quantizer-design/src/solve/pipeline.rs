@@ -1,7 +1,7 @@
 //! The steps from a request to its solutions: bits per sensor, search, Newton's method.
 
 use super::control::{Control, Stage};
-use super::participant::{Participant, WordedCells, gray, plain};
+use super::participant::{SensorDesign, WordedCells, gray, plain};
 use super::polish::polish;
 use super::request::{BitBudget, MAX_BITS, MAX_TOTAL, Request};
 use super::share;
@@ -66,7 +66,7 @@ impl Request<'_> {
     }
 
     fn solve(&self, bits: &[u32], control: &mut Control<'_>) -> Result<Vec<Solution>, Error> {
-        let participants = Participant::all(bits, &self.links);
+        let participants = SensorDesign::all(bits, &self.links);
         let sensors: Vec<usize> = participants.iter().map(|p| p.sensor).collect();
         let model = self.model.subset(&sensors)?;
         let given = self

@@ -1,6 +1,6 @@
 //! Newton's method on the full nodes for the breakpoints of a design found on grids; a cell that becomes empty is merged.
 
-use super::participant::{Participant, WordedCells, system_of};
+use super::participant::{SensorDesign, WordedCells, system_of};
 use super::solution::Solution;
 use crate::criterion::{Criterion, Scored};
 use crate::deadline::Deadline;
@@ -43,7 +43,7 @@ pub(super) fn evaluation_work(model: &ObservationModel, criterion: Criterion, ou
 pub(super) fn polish(
     model: &ObservationModel,
     criterion: Criterion,
-    participants: &[Participant],
+    participants: &[SensorDesign],
     mut cells: Vec<WordedCells>,
     apart: bool,
     deadline: Deadline,

@@ -2,10 +2,10 @@
 
 use super::control::Control;
 use super::landscape::{Grid, Landscape};
-use super::participant::{Participant, WordedCells};
+use super::participant::{SensorDesign, WordedCells};
 use super::request::Request;
 use super::search::{cells_of, climb, grid_with, refine, spacing};
-use super::solution::{SensorDesign, Solution};
+use super::solution::Solution;
 use crate::criterion::{AllowedCells, Criterion};
 use crate::deadline::system_clock;
 use crate::error::{Error, refuse};
@@ -165,10 +165,10 @@ pub fn minimax(
         .into_iter()
         .map(|[mean, deviation, noise]| varied(&centre, mean, 1.0 + deviation, 1.0 + noise))
         .collect::<Result<Vec<_>, _>>()?;
-    let participants = nominal.participants();
-    let laws = participants
+    let laws = nominal
+        .sensors()
         .iter()
-        .map(Participant::law)
+        .map(SensorDesign::law)
         .collect::<Result<Vec<_>, _>>()?;
     let mut weights = vec![1.0 / models.len() as f64; models.len()];
     let weighted: Vec<(f64, &ObservationModel)> = weights.iter().copied().zip(&models).collect();

@@ -34,7 +34,7 @@ fn pair() -> impl Strategy<Value = System> {
             let sds = if equal { [s1, s1] } else { [s1, s2] };
             let rho = if rho.abs() < 0.2 { 0.0 } else { rho };
             let model = ObservationModel::new(
-                Prior::gaussian_with_deviation(1.0).unwrap(),
+                Prior::normal(0.0, 1.0).unwrap(),
                 Noise::equicorrelated_with_deviations(&sds, rho).unwrap(),
             )
             .unwrap();
@@ -54,7 +54,7 @@ fn grouped() -> impl Strategy<Value = System> {
         let prior = if kind == 2 {
             Prior::discrete(vec![-1.0, 0.2, 1.5], vec![0.3, 0.5, 0.2]).unwrap()
         } else {
-            Prior::gaussian_with_deviation(1.0).unwrap()
+            Prior::normal(0.0, 1.0).unwrap()
         };
         let noise = if kind == 1 {
             Noise::equicorrelated_with_deviations(&[sd; 4], 0.3)
@@ -230,7 +230,7 @@ proptest! {
 
     #[test]
     fn the_dynamic_programme_equals_brute_force(sd in 0.3..1.5f64, rho in -0.8..0.8f64, kind in 0..3usize) {
-        let prior = if kind == 2 { Prior::binary(1.5, 0.4) } else { Prior::gaussian_with_deviation(1.0) }.unwrap();
+        let prior = if kind == 2 { Prior::binary(1.5, 0.4) } else { Prior::normal(0.0, 1.0) }.unwrap();
         let model = ObservationModel::new(prior, Noise::equicorrelated_with_deviations(&[sd, sd], rho).unwrap()).unwrap();
         let q = |b: [f64; 2]| Quantizer::new(b.to_vec()).unwrap();
         let system = System::ideal(model, vec![q([-0.7, 0.9]), q([-0.5, 0.4])]).unwrap();
@@ -277,7 +277,7 @@ fn empty_far_and_useless_cells_are_finite() {
     let near = Quantizer::new(vec![-1e-9, 1e-9]).unwrap();
     for rho in [0.0, 0.6] {
         let model = ObservationModel::new(
-            Prior::gaussian_with_deviation(1.0).unwrap(),
+            Prior::normal(0.0, 1.0).unwrap(),
             Noise::equicorrelated_with_deviations(&[1.0; 2], rho).unwrap(),
         )
         .unwrap();
@@ -322,7 +322,7 @@ fn small_equivocations_keep_their_digits() {
 #[test]
 fn a_step_off_leaves_the_saddle_of_two_signs() {
     let model = ObservationModel::new(
-        Prior::gaussian_with_deviation(1.0).unwrap(),
+        Prior::normal(0.0, 1.0).unwrap(),
         Noise::equicorrelated_with_deviations(&[1.0; 2], 0.85).unwrap(),
     )
     .unwrap();

@@ -162,7 +162,7 @@ fn lloyd_max_of_the_normal(entry: &Entry) {
 
 fn remote(entry: &Entry) {
     let i = |k| number(&entry.inputs[k]);
-    let prior = Prior::gaussian_with_deviation(i("sx2").sqrt()).unwrap();
+    let prior = Prior::normal(0.0, i("sx2").sqrt()).unwrap();
     let noise = Noise::independent_with_variances(&[i("s2")]).unwrap();
     close(
         entry,
@@ -181,7 +181,7 @@ fn ceo(entry: &Entry) {
         }
         None => (numbers(s2), numbers(rate)),
     };
-    let prior = Prior::gaussian_with_deviation(number(&entry.inputs["sx2"]).sqrt()).unwrap();
+    let prior = Prior::normal(0.0, number(&entry.inputs["sx2"]).sqrt()).unwrap();
     let noise = Noise::independent_with_variances(&s2).unwrap();
     close(entry, "D", bounds::ceo(&prior, &noise, &rate).unwrap().distortion, number(&entry.value));
 }
@@ -222,11 +222,8 @@ fn model(entry: &Entry) -> ObservationModel {
         _ => vec![1.0, 1.0],
     };
     let rho = i.get("rho").map_or(0.0, number);
-    ObservationModel::new(
-        Prior::gaussian_with_deviation(1.0).unwrap(),
-        Noise::equicorrelated_with_deviations(&sds, rho).unwrap(),
-    )
-    .unwrap()
+    ObservationModel::new(Prior::normal(0.0, 1.0).unwrap(), Noise::equicorrelated_with_deviations(&sds, rho).unwrap())
+        .unwrap()
 }
 
 fn check_values(entry: &Entry, expected: &Value, system: &System) {
@@ -594,7 +591,7 @@ fn alternating_step(entry: &Entry) {
 fn bifurcation(entry: &Entry) {
     let signs = |sd: f64, rho: f64| {
         let noise = Noise::equicorrelated_with_deviations(&[sd, sd], rho)?;
-        let model = ObservationModel::new(Prior::gaussian_with_deviation(1.0)?, noise)?;
+        let model = ObservationModel::new(Prior::normal(0.0, 1.0)?, noise)?;
         System::ideal(model, vec![Quantizer::new(vec![0.0])?; 2])
     };
     let criterion = criterion(&entry.id);
@@ -634,7 +631,7 @@ fn modulo_or_monte_carlo(entry: &Entry) {
         // The simulated value must agree with quadrature within its own interval.
         let model = |rho| {
             ObservationModel::new(
-                Prior::gaussian_with_deviation(1.0).unwrap(),
+                Prior::normal(0.0, 1.0).unwrap(),
                 Noise::equicorrelated_with_deviations(&[1.0; 2], rho).unwrap(),
             )
             .unwrap()

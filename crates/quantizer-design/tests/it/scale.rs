@@ -15,12 +15,12 @@ const SCALES: [f64; 2] = [1e-4, 1e4];
 
 fn pair(rho: f64, scale: f64) -> ObservationModel {
     let noise = Noise::equicorrelated_with_deviations(&[scale, 0.8 * scale], rho).unwrap();
-    ObservationModel::new(Prior::gaussian_with_deviation(scale).unwrap(), noise).unwrap()
+    ObservationModel::new(Prior::normal(0.0, scale).unwrap(), noise).unwrap()
 }
 
 fn equal_pair(rho: f64, scale: f64) -> ObservationModel {
     let noise = Noise::equicorrelated_with_deviations(&[scale; 2], rho).unwrap();
-    ObservationModel::new(Prior::gaussian_with_deviation(scale).unwrap(), noise).unwrap()
+    ObservationModel::new(Prior::normal(0.0, scale).unwrap(), noise).unwrap()
 }
 
 fn size(criterion: Criterion, scale: f64) -> f64 {
