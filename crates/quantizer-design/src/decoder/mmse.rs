@@ -98,7 +98,7 @@ impl MmseDecoder {
     }
 
     /// The estimate of every joint outcome; `None` for an outcome of probability zero. The order is that of
-    /// [`JointTable::outcome`]: the first group varies slowest, and groups of one sensor are ordered by symbol.
+    /// [`JointTable::outcome`](crate::table::JointTable::outcome): the first group varies slowest, and groups of one sensor are ordered by symbol.
     pub fn estimates(&self) -> impl ExactSizeIterator<Item = Option<Estimate>> + '_ {
         self.entries.iter().map(|entry| Self::estimate(*entry).ok())
     }

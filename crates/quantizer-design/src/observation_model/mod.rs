@@ -156,7 +156,7 @@ impl ObservationModel {
     /// A Gaussian prior and sensors with independent noise, all given by their standard deviations.
     ///
     /// # Errors
-    /// As [`Prior::gaussian_with_deviation`], [`Noise::independent_with_deviations`] and [`ObservationModel::new`].
+    /// As [`Prior::normal`], [`Noise::independent_with_deviations`] and [`ObservationModel::new`].
     pub fn gaussian_with_deviations(prior: f64, noise: &[f64]) -> Result<Self, Error> {
         Self::new(Prior::normal(0.0, prior)?, Noise::independent_with_deviations(noise)?)
     }
