@@ -6,8 +6,9 @@ use fewbits::binary_patterns::search::{Descent, LinearSearch, free_breakpoints};
 use fewbits::binary_patterns::{
     BinaryQuantizer, CellGrid, Mask, Pattern, PatternSensor, Source, gray_basis, linear_pattern, rank,
 };
-use fewbits::sensor_assignment::{CodedSensors, Estimator, all_errors, exchange, pair_costs};
-use fewbits_baselines::binary_patterns::{AdaptiveRule, adaptive};
+use fewbits::sensor_assignment::{CodedSensors, Estimator, exchange, pair_costs};
+use fewbits_baselines::binary_patterns::{AdaptiveRule, adaptive, printed_gaussian_cells};
+use fewbits_baselines::sensor_assignment::all_errors;
 use fewbits_experiments::reference;
 
 /// A source, its cells and the noise at one signal-to-noise ratio in dB.
@@ -29,7 +30,7 @@ impl Scene {
 
     fn gaussian(snr: f64) -> Self {
         let sd = 0.1f64.sqrt();
-        Self::new(Source::gaussian_with_deviation(sd).unwrap(), CellGrid::printed_gaussian(sd).unwrap(), snr)
+        Self::new(Source::gaussian_with_deviation(sd).unwrap(), printed_gaussian_cells(sd).unwrap(), snr)
     }
 
     fn search(&self, sensors: usize) -> LinearSearch {

@@ -17,7 +17,7 @@ const MSE: Criterion = Criterion::MeanSquaredError;
 fn pair(sd: f64, rho: f64) -> ObservationModel {
     use fewbits::quantizer_design::{Noise, Prior};
     let noise = Noise::equicorrelated_with_deviations(&[sd; 2], rho).unwrap();
-    ObservationModel::new(Prior::gaussian_with_deviation(1.0).unwrap(), noise).unwrap()
+    ObservationModel::new(Prior::normal(0.0, 1.0).unwrap(), noise).unwrap()
 }
 
 fn sensors(count: usize) -> ObservationModel {
@@ -59,12 +59,10 @@ fn best(row: &str) -> f64 {
         let start = System::ideal(model.clone(), vec![lloyd(levels, model.sample_deviation(0)); 2]).unwrap();
         design::multi_start(&start, criterion, 20, 1, &Newton::default()).unwrap()
     } else {
-        let request = Request::estimation(model.clone(), BitBudget::Each(levels.ilog2()), Link::PERFECT);
-        let request = request.with_cells(AllowedCells::Any).with_starts(60);
-        let request = if criterion == MI {
-            request.by_information()
-        } else {
-            request
+        let request = Request {
+            criterion,
+            cells: AllowedCells::Any,
+            ..Request::estimation(model.clone(), BitBudget::Each(levels.ilog2()), Link::PERFECT)
         };
         // Newton's method stays where it is, and has the curvature.
         joint(request.run().unwrap().best().system(), criterion)
@@ -161,7 +159,11 @@ fn no_design_beats_a_bound() {
         let words = Labelling::natural(levels).unwrap();
         let channel = Channel::binary_symmetric_with_gaps(&words, crossover).unwrap();
         let start = lloyd(levels, model.sample_deviation(0));
-        let group = SensorGroup::new(start, channel, (0..model.sensors()).collect()).unwrap();
+        let group = SensorGroup {
+            quantizer: start,
+            channel,
+            sensors: (0..model.sensors()).collect(),
+        };
         let design = joint(&System::new(model, vec![group]).unwrap(), MSE);
         assert!(design.value > bound.distortion, "{row}");
         if crossover == 0.0 {
@@ -206,7 +208,11 @@ fn nine_sensors_in_different_groups_return_to_one_quantizer() {
                 let quantizer = lloyd(levels, 1.4).affine(shift, 1.0 + 0.4 * shift).unwrap();
                 let own = (first..first + size).collect();
                 first += size;
-                SensorGroup::new(quantizer, Channel::ideal(levels).unwrap(), own).unwrap()
+                SensorGroup {
+                    quantizer,
+                    channel: Channel::ideal(levels).unwrap(),
+                    sensors: own,
+                }
             };
             let groups = sizes.iter().enumerate().map(group).collect();
             let end = joint(&System::new(sensors(9), groups).unwrap(), criterion).quantizers();

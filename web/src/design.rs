@@ -2,7 +2,7 @@
 
 use crate::text;
 use fewbits_core::Link;
-use fewbits_quantizer_design::{BitBudget, Noise, ObservationModel, Prior, Request};
+use fewbits_quantizer_design::{BitBudget, Criterion, Noise, ObservationModel, Prior, Request};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -58,11 +58,13 @@ fn designed(setting: &Setting) -> Result<Found, fewbits_quantizer_design::Error>
     let prior = Prior::normal(setting.mean, setting.deviation)?;
     let model = ObservationModel::new(prior, Noise::independent_with_deviations(&setting.noise)?)?;
     let link = Link::new(setting.loss, setting.flips)?;
-    let mut request = Request::estimation(model, BitBudget::PerSensor(setting.bits.clone()), link)
-        .with_clock(crate::clock::browser)
-        .with_time_limit(LIMIT);
+    let mut request = Request {
+        clock: crate::clock::browser,
+        time_limit: Some(LIMIT),
+        ..Request::estimation(model, BitBudget::PerSensor(setting.bits.clone()), link)
+    };
     if setting.criterion == "information" {
-        request = request.by_information();
+        request.criterion = Criterion::MutualInformation;
     }
     let solutions = request.run()?;
     let solution = solutions.best();

@@ -15,6 +15,7 @@
 //! | [`over_bits`] | published estimators of identical sensors, slot by slot, as receivers of `fewbits-protocol` |
 //! | [`pf_mpa`] | particle message passing, as published and with its errata corrected |
 //! | [`quantizer_design`] | algorithms of the publications for one sensor, and every assignment of words |
+//! | [`sensor_assignment`] | all assignments, the most precise sensor for the coarsest bit, and noise of given moments |
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -28,3 +29,4 @@ pub mod mixture_codec;
 pub mod over_bits;
 pub mod pf_mpa;
 pub mod quantizer_design;
+pub mod sensor_assignment;

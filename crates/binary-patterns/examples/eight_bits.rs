@@ -1,13 +1,13 @@
 //! Eight one-bit sensors about a uniform unknown: the best linear patterns, then breakpoints off the grid.
 
-use fewbits_binary_patterns::search::{LinearSearch, free_breakpoints_of_masks};
+use fewbits_binary_patterns::search::{LinearSearch, free_breakpoints};
 use fewbits_binary_patterns::{CellGrid, Source, bounds, linear_pattern};
 use fewbits_core::Observation;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let source = Source::uniform(1.0)?;
     let (grid, noise) = (CellGrid::uniform(1.0, 3)?, source.noise_deviation(18.2)?);
-    let search = LinearSearch::with_deviation(source, grid.clone(), noise, 8)?;
+    let search = LinearSearch::with_deviation(source, grid, noise, 8)?;
     let best = search.best()?;
     println!("masks {:?}, squared error {:.7}", best.masks, best.mse);
     for mask in &best.masks {
@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let bank = search.bank(&best.masks)?;
     println!("no estimator is below {:.7}", bounds::optimal_weight_van_trees(&bank)?);
 
-    let free = free_breakpoints_of_masks(&source, &grid, &best.masks, noise, 0.02, 2)?;
+    let free = free_breakpoints(&source, &search.sensors(&best.masks)?, 0.02, 2)?;
     println!("free breakpoints: {:.7}", free.mse);
     for sensor in &free.sensors {
         println!("  {:.4?}", sensor.quantizer().breakpoints());

@@ -20,7 +20,7 @@ fn lloyd(levels: usize) -> Quantizer {
 
 fn pair(levels: usize, rho: f64) -> System {
     let model = ObservationModel::new(
-        Prior::gaussian_with_deviation(1.0).unwrap(),
+        Prior::normal(0.0, 1.0).unwrap(),
         Noise::equicorrelated_with_deviations(&[1.0; 2], rho).unwrap(),
     );
     System::ideal(model.unwrap(), vec![lloyd(levels); 2]).unwrap()

@@ -8,8 +8,8 @@ mod models;
 #[path = "../tests/it/nelder_mead.rs"]
 mod nelder_mead;
 
-use fewbits_quantizer_design::Solutions;
 use fewbits_quantizer_design::solve::system_clock;
+use fewbits_quantizer_design::{Request, Solutions};
 use std::io::Write;
 use std::time::Duration;
 
@@ -54,7 +54,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn compare(i: u64, limit: Duration) -> Result<String, Box<dyn std::error::Error>> {
     let scale = |at: u64| [1.0, 1e-4, 1e4][at as usize % 3];
     let solve = |task: &models::Task, limit| -> Result<Solutions, Box<dyn std::error::Error>> {
-        Ok(task.request()?.with_clock(on_processor).with_time_limit(limit).run()?)
+        let request = Request {
+            clock: on_processor,
+            time_limit: Some(limit),
+            ..task.request()?
+        };
+        Ok(request.run()?)
     };
     let task = models::task(i, scale(i), 5, 4)?;
     let start = on_processor();

@@ -107,22 +107,7 @@ impl Scored {
             Kind::Entropy if m[0] > 0.0 => -m[0] * (m[0].max(LOG_FLOOR).ln() - log_multiplicity),
             Kind::Explained if m[0] > 0.0 => m[1] * (m[1] / m[0]),
             Kind::Entropy | Kind::Explained => 0.0,
-            Kind::Equivocation => {
-                let (best, mass, others) = self.favourite(m);
-                if mass <= 0.0 {
-                    return 0.0;
-                }
-                let rest: f64 = self
-                    .weights
-                    .iter()
-                    .zip(m)
-                    .enumerate()
-                    .filter(|(k, (w, q))| *k != best && *w * *q > 0.0)
-                    .map(|(_, (w, q))| w * q * (w * q / mass).ln())
-                    .sum();
-                // The term of the most probable value uses `ln_1p`, since its posterior is often within rounding of one.
-                rest + (mass - others) * (-others / mass).ln_1p()
-            }
+            Kind::Equivocation => -equivocation(&self.weights, m),
             Kind::Information => {
                 let total = self.total(m);
                 self.weights
@@ -132,7 +117,7 @@ impl Scored {
                     .map(|(w, q)| w * q * (q.max(LOG_FLOOR) / total.max(LOG_FLOOR)).ln())
                     .sum()
             }
-            Kind::Decision => -self.favourite(m).2,
+            Kind::Decision => -favourite(&self.weights, m).2,
         }
     }
 
@@ -146,7 +131,7 @@ impl Scored {
                 out[1] = 2.0 * r;
             }
             Kind::Equivocation => {
-                let (best, mass, others) = self.favourite(m);
+                let (best, mass, others) = favourite(&self.weights, m);
                 for (k, ((o, w), q)) in out.iter_mut().zip(&self.weights).zip(m).enumerate() {
                     *o = if mass <= 0.0 {
                         0.0
@@ -187,7 +172,7 @@ impl Scored {
                 }
             }
             Kind::Equivocation => {
-                let (best, mass, others) = self.favourite(m);
+                let (best, mass, others) = favourite(&self.weights, m);
                 let change = self.total(direction);
                 let moved = change - self.weights[best] * direction[best];
                 for (k, (((o, w), q), d)) in out.iter_mut().zip(&self.weights).zip(m).zip(direction).enumerate() {
@@ -217,14 +202,6 @@ impl Scored {
         self.weights.iter().zip(q).map(|(w, q)| w * q).sum()
     }
 
-    /// Index of the most probable value, mass of the outcome, and mass of all other values.
-    fn favourite(&self, q: &[f64]) -> (usize, f64, f64) {
-        let best = most_probable(&self.weights, q);
-        let all = self.weights.iter().zip(q).enumerate();
-        let others: f64 = all.filter(|(k, _)| *k != best).map(|(_, (w, q))| w * q).sum();
-        (best, others + self.weights[best] * q[best], others)
-    }
-
     /// Constant that is added to the sum over outcomes during a design. [`Scored::offset`] is added to the returned value only.
     pub(crate) fn constant(&self, model: &ObservationModel) -> f64 {
         if self.kind == Kind::Explained {
@@ -251,6 +228,29 @@ impl Scored {
             Kind::Explained => value.abs().max(model.variance),
         }
     }
+}
+
+/// Index of the most probable value, mass of the outcome, and mass of all other values.
+fn favourite(weights: &[f64], q: &[f64]) -> (usize, f64, f64) {
+    let best = most_probable(weights, q);
+    let all = weights.iter().zip(q).enumerate();
+    let others: f64 = all.filter(|(k, _)| *k != best).map(|(_, (w, q))| w * q).sum();
+    (best, others + weights[best] * q[best], others)
+}
+
+/// Part of an outcome in the entropy of the unknown given the outcome, `-sum_k w q ln(w q / Q)`, as a sum of positive terms.
+pub(crate) fn equivocation(weights: &[f64], q: &[f64]) -> f64 {
+    let (best, mass, others) = favourite(weights, q);
+    if mass <= 0.0 {
+        return 0.0;
+    }
+    let joint = weights.iter().zip(q).map(|(w, q)| w * q).enumerate();
+    let rest: f64 = joint
+        .filter(|(k, joint)| *k != best && *joint > 0.0)
+        .map(|(_, joint)| joint * (joint / mass).ln())
+        .sum();
+    // The term of the most probable value uses `ln_1p`, since its posterior is often within rounding of one.
+    -(rest + (mass - others) * (-others / mass).ln_1p())
 }
 
 /// Index of the largest `w_k q_k`; the first one if several are equal.

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::outcomes::counts::Compositions;
-use crate::outcomes::{Feature, Table, cell_probabilities, for_each_log, moments};
+use crate::outcomes::{Table, cell_probabilities, for_each_log};
 use crate::system::{SensorGroup, System};
 use fewbits_numerics::{kernels, normal};
 
@@ -37,16 +37,16 @@ impl<'a> Active<'a> {
     /// If there is no such group.
     pub fn new(system: &'a System, index: usize) -> Result<Self, Error> {
         let group = system.group(index)?;
-        let outputs = group.channel().outputs();
-        let (means, deviation) = system.model().sample_law(group.sensors()[0]);
-        let exchange = (0..group.quantizer().breakpoints().len())
+        let outputs = group.channel.outputs();
+        let (means, deviation) = system.model().sample_law(group.sensors[0]);
+        let exchange = (0..group.quantizer.breakpoints().len())
             .map(|i| {
                 (0..outputs)
                     .map(|t| group.cell_transition(t, i) - group.cell_transition(t, i + 1))
                     .collect()
             })
             .collect();
-        let compositions = Compositions::new(group.sensors().len(), outputs);
+        let compositions = Compositions::new(group.sensors.len(), outputs);
         Ok(Self {
             index,
             group,
@@ -64,7 +64,7 @@ impl<'a> Active<'a> {
 
     /// The breakpoints of the group in the system.
     pub fn breakpoints(&self) -> &'a [f64] {
-        self.group.quantizer().breakpoints()
+        self.group.quantizer.breakpoints()
     }
 
     /// Probability of each cell at each node.
@@ -102,23 +102,22 @@ impl<'a> Active<'a> {
         (self.compositions.probabilities(&symbols).swap_remove(0), symbols)
     }
 
-    /// Density of the sample at each breakpoint, and its derivative, at every node.
-    pub fn densities(&self, b: &[f64]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
-        b.iter()
-            .map(|b| {
-                let standardised = self.means.iter().map(|m| (b - m) / self.deviation);
-                standardised
-                    .map(|u| {
-                        let density = normal::pdf(u) / self.deviation;
-                        (density, -u * density / self.deviation)
-                    })
-                    .unzip()
+    /// Density of the sample at each breakpoint, and its derivative, at every node: a row per breakpoint.
+    pub fn densities(&self, b: &[f64]) -> (Table, Table) {
+        let standardised = b
+            .iter()
+            .flat_map(|b| self.means.iter().map(move |m| (b - m) / self.deviation));
+        let (densities, slopes) = standardised
+            .map(|u| {
+                let density = normal::pdf(u) / self.deviation;
+                (density, -u * density / self.deviation)
             })
-            .unzip()
+            .unzip();
+        (Table::new(densities, self.means.len()), Table::new(slopes, self.means.len()))
     }
 
     /// The tables that enter the node sums as factors.
-    pub(crate) fn slots(&self, symbols: &Table, densities: &[Vec<f64>], slopes: &[Vec<f64>]) -> Slots {
+    pub(crate) fn slots(&self, symbols: &Table, (densities, slopes): (Table, Table)) -> Slots {
         let nodes = self.means.len();
         let mut levels = self.compositions.probabilities(symbols).into_iter();
         let reports = [(); 3].map(|()| levels.next().unwrap_or(Table::new(Vec::new(), nodes)));
@@ -126,15 +125,15 @@ impl<'a> Active<'a> {
         let mut pairs = Vec::new();
         if self.compositions.total >= 2 {
             for (i, p) in densities.iter().enumerate() {
-                for q in &densities[i..] {
+                for q in densities.iter().skip(i) {
                     pairs.extend(p.iter().zip(q).map(|(x, y)| x * y));
                 }
             }
         }
         Slots {
             reports,
-            densities: Table::new(densities.concat(), nodes),
-            slopes: Table::new(slopes.concat(), nodes),
+            densities,
+            slopes,
             pairs: Table::new(pairs, nodes),
         }
     }
@@ -154,42 +153,21 @@ pub(crate) fn negative_entropy(symbols: &Table, mass: &[f64]) -> f64 {
         .sum()
 }
 
-/// Report probabilities of every group at every node, and the log multiplicity of every joint outcome, with the first group varying
-/// slowest.
-pub(crate) struct Reports {
-    tables: Vec<Table>,
-    pub(crate) log_multiplicity: Vec<f64>,
-}
-
-impl Reports {
-    pub(crate) fn of(system: &System) -> Result<Self, Error> {
-        system.check_outcomes()?;
-        let mut tables = Vec::with_capacity(system.groups().len());
-        let mut log_multiplicity = vec![0.0];
-        for index in 0..system.groups().len() {
-            let entry = Active::new(system, index)?;
-            tables.push(entry.reports(entry.breakpoints()).0);
-            log_multiplicity = sums(&log_multiplicity, &entry.compositions.log_multiplicity);
-        }
-        Ok(Self {
-            tables,
-            log_multiplicity,
-        })
-    }
-
-    /// For every joint outcome, its moments: the features of the product of its report probabilities.
-    pub(crate) fn moments(&self, features: &[Feature]) -> Vec<f64> {
-        moments(&self.tables.iter().collect::<Vec<_>>(), features)
-    }
+/// Report probabilities at the nodes of every group.
+pub(crate) fn report_tables(system: &System) -> Result<Vec<Table>, Error> {
+    system.check_outcomes()?;
+    of_groups(system, |entry| entry.reports(entry.breakpoints()).0)
 }
 
 /// Symbol probabilities at the nodes of a sensor of each group.
 pub(crate) fn symbol_tables(system: &System) -> Result<Vec<Table>, Error> {
-    let of = |g| {
-        let entry = Active::new(system, g)?;
-        Ok(entry.symbols(entry.breakpoints()))
-    };
-    (0..system.groups().len()).map(of).collect()
+    of_groups(system, |entry| entry.symbols(entry.breakpoints()))
+}
+
+/// A table for every group.
+fn of_groups(system: &System, table: impl Fn(&Active<'_>) -> Table) -> Result<Vec<Table>, Error> {
+    let groups = 0..system.groups().len();
+    groups.map(|index| Ok(table(&Active::new(system, index)?))).collect()
 }
 
 /// `ln P(outcome | x_k)` for every joint outcome, outcomes by values. It stays accurate if the probabilities underflow.
@@ -198,16 +176,10 @@ pub(crate) fn symbol_tables(system: &System) -> Result<Vec<Table>, Error> {
 /// [`Error::TooLarge`] if there are more outcomes than the system allows.
 pub fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
     system.check_outcomes()?;
-    let tables = (0..system.groups().len())
-        .map(|index| {
-            Ok(Active::new(system, index)?
-                .log_symbols()
-                .of_log_counts(system.groups()[index].sensors().len()))
-        })
-        .collect::<Result<Vec<Table>, Error>>()?;
+    let tables = of_groups(system, |entry| entry.log_symbols().of_log_counts(entry.compositions.total))?;
     let model = system.model();
     let mut out = Vec::new();
-    for_each_log(&tables.iter().collect::<Vec<_>>(), &vec![0.0; model.nodes()], |_, row| {
+    for_each_log(&tables, &vec![0.0; model.nodes()], |_, row| {
         // With correlated noise each value is a mixture over nodes: log-sum-exp over the nodes of the value.
         for feature in &model.given {
             let logs = row[feature.start..].iter().zip(&feature.weights);

@@ -94,6 +94,6 @@ pub use error::Error;
 pub use fewbits_quantizers::{Channel, Labelling, Quantizer, Symbol, canonical, lloyd_max, quantizer};
 pub use newton::{AtSaddle, Certificate, Newton};
 pub use observation_model::{Noise, ObservationModel, Prior};
-pub use solve::{Adc, BitBudget, Export, Progress, Request, Solution, Solutions};
+pub use solve::{Adc, BitBudget, Export, Progress, Request, Solution, Solutions, WordedCells};
 pub use system::{SensorGroup, System};
 pub use table::JointTable;

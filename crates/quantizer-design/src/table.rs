@@ -1,10 +1,11 @@
 //! The table of joint outcomes of a system, for inspection and for decisions.
 
-use crate::criterion::most_probable;
+use crate::criterion::{equivocation, most_probable};
 use crate::error::{Error, refuse};
-use crate::law::Reports;
+use crate::law::report_tables;
 use crate::observation_model::ObservationModel;
 use crate::outcomes::counts::rank;
+use crate::outcomes::moments;
 use crate::system::System;
 use fewbits_numerics::error::entries;
 
@@ -23,7 +24,7 @@ impl Layout {
         let groups = system.groups();
         let entries = groups
             .iter()
-            .map(|g| (g.sensors().to_vec(), g.channel().outputs(), g.outcomes() as usize));
+            .map(|g| (g.sensors.to_vec(), g.channel.outputs(), g.outcomes() as usize));
         Self {
             groups: entries.collect(),
             sensors: system.model().sensors(),
@@ -62,7 +63,6 @@ pub struct JointTable {
     layout: Layout,
     /// Outcomes by values.
     likelihood: Vec<f64>,
-    log_multiplicity: Vec<f64>,
 }
 
 impl JointTable {
@@ -73,12 +73,10 @@ impl JointTable {
     pub fn new(system: &System) -> Result<Self, Error> {
         let needed = system.outcomes().saturating_mul(system.model().values().len() as u64);
         Error::at_most("joint outcome table", needed, ENTRY_LIMIT)?;
-        let reports = Reports::of(system)?;
         Ok(Self {
             layout: Layout::new(system),
             system: system.clone(),
-            likelihood: reports.moments(&system.model().given),
-            log_multiplicity: reports.log_multiplicity,
+            likelihood: moments(&report_tables(system)?, &system.model().given),
         })
     }
 
@@ -93,7 +91,7 @@ impl JointTable {
 
     /// Number of outcomes.
     pub fn outcomes(&self) -> usize {
-        self.log_multiplicity.len()
+        self.likelihood.len() / self.values().len()
     }
 
     /// Values of the unknown, the columns of the table.
@@ -109,16 +107,10 @@ impl JointTable {
         self.layout.index(symbols)
     }
 
-    /// `P(outcome | x_k)` for all `k`; sums to 1 over outcomes. An outcome does not say which sensor of a group sent what: divide by the
-    /// [`multiplicity`](Self::multiplicity) for one particular report.
+    /// `P(outcome | x_k)` for all `k`; sums to 1 over outcomes. An outcome does not say which sensor of a group sent what.
     pub fn likelihood(&self, outcome: usize) -> &[f64] {
         let values = self.model().values().len();
         self.likelihood.chunks_exact(values).nth(outcome).unwrap_or_default()
-    }
-
-    /// Number of different reports of individual sensors that give this outcome.
-    pub fn multiplicity(&self, outcome: usize) -> f64 {
-        self.log_multiplicity.get(outcome).map_or(0.0, |l| l.exp().round())
     }
 
     /// Prior probability of an outcome.
@@ -146,26 +138,7 @@ impl JointTable {
         if !self.model().is_discrete() {
             return refuse("prior", "a continuous prior", "a discrete prior for a conditional entropy");
         }
-        let mut total = 0.0;
-        for outcome in 0..self.outcomes() {
-            let mass = self.probability(outcome);
-            let best = self.decide(outcome);
-            if mass <= 0.0 {
-                continue;
-            }
-            let mut others = 0.0;
-            for (k, (w, q)) in self.model().weights().iter().zip(self.likelihood(outcome)).enumerate() {
-                let joint = w * q;
-                if k != best && joint > 0.0 {
-                    others += joint;
-                    // The quotient is at most 1; its inverse would overflow for the smallest numbers.
-                    total -= joint * (joint / mass).ln();
-                }
-            }
-            // -(1 - d) ln(1 - d) of the most probable value.
-            let d = others / mass;
-            total -= mass * (1.0 - d) * (-d).ln_1p();
-        }
-        Ok(total)
+        let outcomes = self.likelihood.chunks_exact(self.values().len());
+        Ok(outcomes.map(|q| equivocation(self.model().weights(), q)).sum())
     }
 }

@@ -3,7 +3,9 @@
 use crate::error::Error;
 use fewbits_core::Link;
 use fewbits_quantizer_design::solve::{MAX_BITS, Watch};
-use fewbits_quantizer_design::{Adc, AllowedCells, BitBudget, Noise, ObservationModel, Prior, Request, Solutions};
+use fewbits_quantizer_design::{
+    Adc, AllowedCells, BitBudget, Noise, ObservationModel, Prior, Request, Solutions, WordedCells,
+};
 use std::time::Duration;
 
 const PRIOR: &str =
@@ -69,22 +71,23 @@ impl Task {
         }))?;
         let failed = "no design";
         let (bits, link) = (self.bits.clone(), Link::PERFECT);
-        let mut request = match self.criterion {
+        let request = match self.criterion {
             Criterion::Decision => Request::detection(model, bits, link).map_err(refused(failed))?,
             Criterion::Error => Request::estimation(model, bits, link),
-            Criterion::Information => Request::estimation(model, bits, link).by_information(),
+            Criterion::Information => Request {
+                criterion: fewbits_quantizer_design::Criterion::MutualInformation,
+                ..Request::estimation(model, bits, link)
+            },
         };
-        request = request
-            .with_links(self.links.clone())
-            .map_err(refused(failed))?
-            .with_cells(self.cells);
-        if let Some(start) = self.between_points() {
-            request = request.with_start(start).map_err(refused(failed))?;
-        }
-        if let Some(limit) = self.time_limit {
-            request = request.with_time_limit(limit);
-        }
-        request.with_progress(progress).run().map_err(refused(failed))
+        let request = Request {
+            links: self.links.clone(),
+            cells: self.cells,
+            start: self.between_points(),
+            time_limit: self.time_limit,
+            progress: Some(progress),
+            ..request
+        };
+        request.run().map_err(refused(failed))
     }
 }
 
@@ -104,9 +107,6 @@ pub fn negligible(prior: &Prior) -> f64 {
 const MAX_POINTS: usize = 16;
 const MIN_TIMES: usize = 8;
 
-/// Breakpoints of a sensor, and the word of each cell.
-type WordedCells = (Vec<f64>, Vec<usize>);
-
 impl Task {
     /// Cells that part the points of a discrete prior, as a start of the search: where noise is small beside the gaps, the criterion is flat
     /// between them. `None` for other priors and budgets.
@@ -124,7 +124,7 @@ impl Task {
             let breakpoints = parted(&points, 1 << bits);
             // Neighbours differ in one bit.
             let words = (0..=breakpoints.len()).map(|cell| cell ^ (cell >> 1)).collect();
-            Some((breakpoints, words))
+            Some(WordedCells { breakpoints, words })
         };
         (0..self.deviations.len()).map(cells).collect()
     }

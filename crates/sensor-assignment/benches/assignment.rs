@@ -3,8 +3,9 @@
 #![allow(clippy::unwrap_used)]
 
 use divan::Bencher;
+use fewbits_baselines::sensor_assignment::all_errors;
 use fewbits_binary_patterns::BinaryQuantizer;
-use fewbits_sensor_assignment::{CodedSensors, CostMatrix, Estimator, all_errors, pair_costs};
+use fewbits_sensor_assignment::{CodedSensors, CostMatrix, Estimator, pair_costs};
 
 fn main() {
     divan::main();

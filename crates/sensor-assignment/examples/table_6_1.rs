@@ -1,6 +1,7 @@
 //! Eight sensors of unequal noise share the eight bits of a Gray code: which bit to ask of which sensor.
 
-use fewbits_sensor_assignment::{CodedSensors, Estimator, by_precision, exchange, pair_costs, quantization_error};
+use fewbits_baselines::sensor_assignment::by_precision;
+use fewbits_sensor_assignment::{CodedSensors, Estimator, exchange, pair_costs, quantization_error};
 
 fn main() -> Result<(), fewbits_sensor_assignment::Error> {
     let variances = [0.04, 0.03, 0.02, 0.01, 0.008, 0.006, 0.005, 0.001];

@@ -8,7 +8,6 @@ use fewbits_core::Observation;
 use fewbits_numerics::error::{entries, positive, refuse};
 use fewbits_numerics::quadrature::gauss_legendre;
 use fewbits_quantizer_design::outcomes::{Feature, Table, explained, moments};
-use serde::{Deserialize, Serialize};
 
 /// Largest number of sensors: there are `2^N` cells.
 const MAX_SENSORS: usize = 16;
@@ -16,42 +15,23 @@ const MAX_SENSORS: usize = 16;
 const PANEL: f64 = 2.0;
 
 /// The first two moments of `u` at the nodes; for `u` see [`CodedSensors::centre_mse`].
-pub(crate) type Moments = (Vec<f64>, Vec<f64>);
+pub type Moments = (Vec<f64>, Vec<f64>);
 
 /// `N` sensors that send the `N` Gray code bits of `2^N` cells over `[-V, V]`, one bit each.
 ///
 /// The constructor computes every bit's probabilities for every sensor's noise, so that errors of assignments take little time.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredSensors")]
+#[derive(Debug, Clone, PartialEq)]
 pub struct CodedSensors {
-    #[serde(skip_serializing)]
     source: Source,
     half_width: f64,
     noise_deviations: Vec<f64>,
-    #[serde(skip_serializing)]
     quantizers: Vec<BinaryQuantizer>,
     /// Nodes on `[0, V]`, since the code is symmetric except for its first bit.
-    #[serde(skip_serializing)]
-    pub(crate) nodes: Nodes,
+    #[doc(hidden)]
+    pub nodes: Nodes,
     /// Probabilities of the bit's two values at the nodes: `[bit][sensor]`.
-    #[serde(skip_serializing)]
-    pub(crate) probability: Vec<Vec<Table>>,
-}
-
-/// The stored form of [`CodedSensors`].
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredSensors {
-    half_width: f64,
-    noise_deviations: Vec<f64>,
-}
-
-impl TryFrom<StoredSensors> for CodedSensors {
-    type Error = Error;
-
-    fn try_from(parts: StoredSensors) -> Result<Self, Error> {
-        CodedSensors::with_deviations(parts.half_width, &parts.noise_deviations)
-    }
+    #[doc(hidden)]
+    pub probability: Vec<Vec<Table>>,
 }
 
 impl CodedSensors {
@@ -160,7 +140,8 @@ impl CodedSensors {
     }
 
     /// Weights of probability and first moment. The nodes cover one side, with the weight of both.
-    pub(crate) fn features(&self) -> [Feature; 2] {
+    #[doc(hidden)]
+    pub fn features(&self) -> [Feature; 2] {
         let mass: Vec<f64> = self.nodes.w.iter().map(|w| 0.5 * w).collect();
         let moment = mass.iter().zip(&self.nodes.x).map(|(w, x)| w * x).collect();
         [Feature::of_all(mass), Feature::of_all(moment)]
@@ -211,7 +192,8 @@ impl CodedSensors {
 
     /// One step of the recursion of [`centre_mse`](Self::centre_mse).
     #[inline]
-    pub(crate) fn push_bit(&self, bit: usize, sensor: usize, (m1, m2): &Moments, next: &mut Moments) {
+    #[doc(hidden)]
+    pub fn push_bit(&self, bit: usize, sensor: usize, (m1, m2): &Moments, next: &mut Moments) {
         let p = &self.probability[bit][sensor];
         let (p0, p1) = (p.row(0), p.row(1));
         let from = m1.iter().zip(m2).zip(p0.iter().zip(p1));
@@ -221,7 +203,9 @@ impl CodedSensors {
         }
     }
 
-    pub(crate) fn centre_error(&self, (m1, m2): &Moments) -> f64 {
+    /// Error of the centre decoder, given the moments of `u` after all bits.
+    #[doc(hidden)]
+    pub fn centre_error(&self, (m1, m2): &Moments) -> f64 {
         let v = self.half_width;
         let mut sum = 0.0;
         for (((m1, m2), x), w) in m1.iter().zip(m2).zip(&self.nodes.x).zip(&self.nodes.w) {
@@ -233,7 +217,7 @@ impl CodedSensors {
 
 /// What an outcome of the other bits explains, given probability and first moment with the first bit 0 and with it 1, from one side of the
 /// axis. Reflecting `x` inverts the first bit and no other, so the two values are mirror images and explain the same.
-pub(crate) fn explained_by_pair(sums: &[f64]) -> f64 {
+pub fn explained_by_pair(sums: &[f64]) -> f64 {
     2.0 * explained(sums[0] + sums[2], sums[1] - sums[3])
 }
 
@@ -308,9 +292,6 @@ mod tests {
             let pair = 2.0 * (2.0 * f64::from(cell / 2) + 1.0 - 4.0) / 4.0;
             assert!((sensors.decode(&order, &seen).unwrap() - pair).abs() < 1e-2);
         }
-        let json = serde_json::to_string(&sensors).unwrap();
-        assert_eq!(serde_json::from_str::<CodedSensors>(&json).unwrap(), sensors);
-        assert!(serde_json::from_str::<CodedSensors>(r#"{"half_width":1.0,"noise_deviations":[0.1,-0.1]}"#).is_err());
     }
 
     #[test]

@@ -5,24 +5,25 @@
 
 use crate::{CodedSensors, Error, pair_costs};
 use fewbits_core::Link;
-use fewbits_quantizer_design::{AllowedCells, BitBudget, ObservationModel, Request};
-
-/// Breakpoints of a sensor, and the word of each cell.
-type BitCells = (Vec<f64>, Vec<usize>);
+use fewbits_quantizer_design::{AllowedCells, BitBudget, ObservationModel, Request, WordedCells};
 
 /// For each sensor, breakpoints and words of the Gray bit that it sends in the best linear assignment, for a
 /// uniform unknown with the prior's mean and variance.
-fn bit_cells(model: &ObservationModel) -> Result<Vec<BitCells>, Error> {
+fn bit_cells(model: &ObservationModel) -> Result<Vec<WordedCells>, Error> {
     let half_width = 3f64.sqrt() * model.prior().deviation();
     let deviations: Vec<f64> = (0..model.sensors()).map(|n| model.noise().deviation(n)).collect();
     let sensors = CodedSensors::with_deviations(half_width, &deviations)?;
     let assignment = pair_costs(&sensors).solve();
     let mean = model.prior().mean();
-    let mut cells = vec![(Vec::new(), Vec::new()); deviations.len()];
+    let none = WordedCells {
+        breakpoints: Vec::new(),
+        words: Vec::new(),
+    };
+    let mut cells = vec![none; deviations.len()];
     for (sensor, quantizer) in assignment.iter().zip(sensors.quantizers()) {
         let breakpoints: Vec<f64> = quantizer.breakpoints().iter().map(|b| mean + b).collect();
         let words = (0..=breakpoints.len()).map(|cell| cell % 2).collect();
-        cells[*sensor] = (breakpoints, words);
+        cells[*sensor] = WordedCells { breakpoints, words };
     }
     Ok(cells)
 }
@@ -35,7 +36,9 @@ fn bit_cells(model: &ObservationModel) -> Result<Vec<BitCells>, Error> {
 /// use fewbits_quantizer_design::{Noise, Prior, ObservationModel};
 /// let noise = Noise::independent_with_deviations(&[0.2, 0.1, 0.05])?;
 /// let model = ObservationModel::new(Prior::uniform(0.0, 2.0)?, noise)?;
-/// let solutions = fewbits_sensor_assignment::bit_per_sensor(model, Link::flipping(0.01)?)?.with_starts(4).run()?;
+/// let mut request = fewbits_sensor_assignment::bit_per_sensor(model, Link::flipping(0.01)?)?;
+/// request.starts = 4;
+/// let solutions = request.run()?;
 /// assert!(solutions.best().value < 0.08);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -43,10 +46,11 @@ fn bit_cells(model: &ObservationModel) -> Result<Vec<BitCells>, Error> {
 /// # Errors
 /// If there are more than 16 sensors.
 pub fn bit_per_sensor(model: ObservationModel, link: Link) -> Result<Request<'static>, Error> {
-    let cells = bit_cells(&model)?;
-    Request::estimation(model, BitBudget::Each(1), link)
-        .with_cells(AllowedCells::Any)
-        .with_start(cells)
+    Ok(Request {
+        cells: AllowedCells::Any,
+        start: Some(bit_cells(&model)?),
+        ..Request::estimation(model, BitBudget::Each(1), link)
+    })
 }
 
 #[cfg(test)]
@@ -63,8 +67,9 @@ mod tests {
         for (scale, mean) in [(1.0, 0.0), (1e-4, 3.0)] {
             let noise = Noise::independent_with_deviations(&deviations.map(|d| scale * d)).unwrap();
             let prior = Prior::uniform(mean - scale, mean + scale).unwrap();
-            let request = bit_per_sensor(ObservationModel::new(prior, noise).unwrap(), Link::PERFECT).unwrap();
-            let found = request.with_starts(2).run().unwrap().best().value / (scale * scale);
+            let mut request = bit_per_sensor(ObservationModel::new(prior, noise).unwrap(), Link::PERFECT).unwrap();
+            request.starts = 2;
+            let found = request.run().unwrap().best().value / (scale * scale);
             let patterns = sensors.mmse(&assignment).unwrap();
             assert!(found <= patterns * (1.0 + 1e-6), "{found} {patterns}");
         }

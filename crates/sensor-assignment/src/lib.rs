@@ -26,17 +26,22 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+/// Parts of the exact errors, for the comparisons in `fewbits-baselines`. No promise is made of them.
+#[doc(hidden)]
+pub mod engine {
+    pub use crate::coded::{Moments, explained_by_pair};
+    pub use crate::cost::flipped_centre;
+}
+
 mod coded;
 mod cost;
 mod design;
-mod enumerate;
+mod exchange;
 mod linear;
-mod setup;
 
 pub use coded::CodedSensors;
-pub use cost::{bit_error, flipped_estimate, pair_costs, quantization_error};
+pub use cost::{pair_costs, quantization_error};
 pub use design::bit_per_sensor;
-pub use enumerate::{AllErrors, Estimator, Exchanged, all_errors, exchange};
+pub use exchange::{Estimator, Exchanged, exchange};
 pub use fewbits_quantizer_design::Error;
 pub use linear::{CostMatrix, DualCertificate};
-pub use setup::{by_precision, variances_with_moments};

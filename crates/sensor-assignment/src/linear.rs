@@ -2,41 +2,18 @@
 
 use super::coded::check_permutation;
 use crate::Error;
+use fewbits_multi_target::assign;
 use fewbits_numerics::error::{all_finite, refuse};
-use serde::{Deserialize, Serialize};
 
 /// Tolerance of the certificate's inequalities, relative to the largest cost.
 const SLACK: f64 = 1e-12;
 
 /// A square matrix of finite costs; each row is matched with one column.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Vec<Vec<f64>>", into = "Vec<Vec<f64>>")]
+#[derive(Debug, Clone, PartialEq)]
 pub struct CostMatrix {
     pub(crate) size: usize,
     /// Row by row.
     pub(crate) costs: Vec<f64>,
-}
-
-impl From<CostMatrix> for Vec<Vec<f64>> {
-    fn from(matrix: CostMatrix) -> Self {
-        matrix.rows().map(<[f64]>::to_vec).collect()
-    }
-}
-
-impl TryFrom<Vec<Vec<f64>>> for CostMatrix {
-    type Error = Error;
-
-    fn try_from(rows: Vec<Vec<f64>>) -> Result<Self, Error> {
-        let size = rows.len();
-        if let Some(row) = rows.iter().find(|row| row.len() != size) {
-            return not_square(row.len(), size);
-        }
-        Self::new(size, rows.concat())
-    }
-}
-
-fn not_square<T>(entries: usize, size: usize) -> Result<T, Error> {
-    refuse("costs", format!("{entries} entries"), format!("{size} x {size}, and at least one"))
 }
 
 impl CostMatrix {
@@ -47,7 +24,7 @@ impl CostMatrix {
     pub fn new(size: usize, costs: Vec<f64>) -> Result<Self, Error> {
         let entries = costs.len();
         if size == 0 || size.checked_mul(size) != Some(entries) {
-            return not_square(entries, size);
+            return refuse("costs", format!("{entries} entries"), format!("{size} x {size}, and at least one"));
         }
         all_finite("costs", &costs)?;
         Ok(Self { size, costs })
@@ -79,69 +56,15 @@ impl CostMatrix {
     /// The column of each row for the smallest total cost, by shortest augmenting paths (Jonker and Volgenant 1987). `O(n^3)` in
     /// the worst case. Deterministic: the same costs give the same result.
     ///
-    /// ```text
-    /// u, v <- 0                                            # duals: u_i + v_j <= c_ij throughout
-    /// for each row
-    ///     slack_j <- c_ij - u_i - v_j along paths from that row that alternate between free and matched entries
-    ///     repeat
-    ///         change the duals of the reached rows and columns until another column has slack 0
-    ///     until that column is free
-    ///     exchange matched and free entries along the path to it
-    /// ```
-    ///
     /// The thesis describes the older Hungarian method with its Hopcroft-Karp step. The result is equally good, as
     /// [`CostMatrix::certificate`] proves.
     pub fn solve(&self) -> Vec<usize> {
-        let n = self.size;
         let largest = self.costs.iter().fold(0.0f64, |m, c| m.max(c.abs()));
         // Costs are scaled, since differences of the largest numbers would overflow.
         let unit = if largest > 0.0 { largest } else { 1.0 };
-        let cost = |row: usize, column: usize| self.costs[(row - 1) * n + column - 1] / unit;
-        // Rows and columns count from 1; column 0 stands for the row that is being matched, row 0 for none.
-        let (mut u, mut v, mut row_of) = (vec![0.0; n + 1], vec![0.0; n + 1], vec![0; n + 1]);
-        for row in 1..=n {
-            row_of[0] = row;
-            let (mut slack, mut before) = (vec![f64::INFINITY; n + 1], vec![0; n + 1]);
-            let mut reached = vec![false; n + 1];
-            let mut column = 0;
-            loop {
-                reached[column] = true;
-                let here = row_of[column];
-                let (mut least, mut next) = (f64::INFINITY, 0);
-                for j in (1..=n).filter(|j| !reached[*j]) {
-                    let reduced = cost(here, j) - u[here] - v[j];
-                    if reduced < slack[j] {
-                        (slack[j], before[j]) = (reduced, column);
-                    }
-                    if slack[j] < least {
-                        (least, next) = (slack[j], j);
-                    }
-                }
-                // Reduced costs of matched entries stay zero, since their row and column change by opposite amounts.
-                for j in 0..=n {
-                    if reached[j] {
-                        u[row_of[j]] += least;
-                        v[j] -= least;
-                    } else {
-                        slack[j] -= least;
-                    }
-                }
-                column = next;
-                if row_of[column] == 0 {
-                    break;
-                }
-            }
-            // The column is free: move every match on the path by one column.
-            while column != 0 {
-                row_of[column] = row_of[before[column]];
-                column = before[column];
-            }
-        }
-        let mut columns = vec![0; n];
-        for column in 1..=n {
-            columns[row_of[column] - 1] = column - 1;
-        }
-        columns
+        let rows: Vec<Vec<f64>> = self.rows().map(|row| row.iter().map(|c| c / unit).collect()).collect();
+        // Refused are only matrices that are not square or not finite.
+        assign(&rows).unwrap_or_default()
     }
 
     /// Dual variables that show whether an assignment is optimal.
@@ -199,7 +122,7 @@ impl CostMatrix {
 }
 
 /// Dual variables of an assignment, and their distance from a proof of its optimality.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct DualCertificate {
     /// Dual variable `u_i` of each row.
     pub rows: Vec<f64>,
@@ -223,9 +146,23 @@ impl DualCertificate {
 
 #[cfg(test)]
 mod tests {
-    use super::super::enumerate::for_permutations;
     use super::*;
     use proptest::prelude::*;
+
+    /// Visits all permutations of `0..n`.
+    fn for_permutations(n: usize, mut visit: impl FnMut(&[usize])) {
+        let mut all = vec![Vec::new()];
+        for _ in 0..n {
+            let longer = |p: Vec<usize>| {
+                (0..n)
+                    .filter(|i| !p.contains(i))
+                    .map(|i| [p.as_slice(), &[i]].concat())
+                    .collect::<Vec<_>>()
+            };
+            all = all.into_iter().flat_map(longer).collect();
+        }
+        all.iter().for_each(|p| visit(p));
+    }
 
     fn least(costs: &CostMatrix) -> f64 {
         let mut best = f64::INFINITY;

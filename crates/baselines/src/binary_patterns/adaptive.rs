@@ -1,5 +1,6 @@
 //! Adaptive quantization: the sensors report in turn, and each is told the earlier bits.
 
+use super::even_nodes;
 use fewbits_binary_patterns::Error;
 use fewbits_binary_patterns::IMPOSSIBLE;
 use fewbits_binary_patterns::Nodes;
@@ -74,7 +75,7 @@ pub fn adaptive(
         }
     }
     // The tree is expanded depth first; one buffer of node weights per depth is enough.
-    let nodes = source.nodes(2.0 * noise_deviation, gauss_legendre::<12>());
+    let nodes = even_nodes(source, 2.0 * noise_deviation, gauss_legendre::<12>());
     let mut tree = Tree {
         source,
         noise_deviation,

@@ -106,7 +106,7 @@ fn division_map(bank: &Bank, grid: &CellGrid, scaled: impl Fn(f64, f64) -> f64) 
     let prior: Vec<f64> = cells.iter().map(|cell| log(cell.mass)).collect();
     let mut estimates = Vec::new();
     // With the logarithm of the cell's prior probability the score is the log posterior up to a constant.
-    for_each_log(&tables.iter().collect::<Vec<_>>(), &prior, |_, score| {
+    for_each_log(&tables, &prior, |_, score| {
         estimates.push(cells[first_largest(score, |best| TIE * best.abs().max(1.0))].centroid);
     });
     estimates

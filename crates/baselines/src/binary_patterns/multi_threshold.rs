@@ -1,5 +1,6 @@
 //! Ribeiro and Giannakis (2006): one threshold per sensor, distributed over the range of the source to minimise a Cramer-Rao bound.
 
+use super::even_nodes;
 use fewbits_binary_patterns::Error;
 use fewbits_binary_patterns::Nodes;
 use fewbits_binary_patterns::Source;
@@ -66,7 +67,7 @@ fn optimum(
 ) -> Result<MultiThreshold, Error> {
     let total = at_least_one("sensors", sensors)? as f64;
     let noise_deviation = source.resolvable(noise_deviation)?;
-    let nodes = source.nodes(noise_deviation, gauss_legendre::<8>());
+    let nodes = even_nodes(source, noise_deviation, gauss_legendre::<8>());
     let limit = source.reach() + MARGIN * noise_deviation;
     let thresholds: Vec<f64> = (0..THRESHOLDS)
         .map(|k| limit * (2.0 * k as f64 / (THRESHOLDS - 1) as f64 - 1.0))

@@ -72,9 +72,9 @@ pub fn alternate(system: &System, group: usize, criterion: Criterion, rule: &Alt
     let mut change = f64::INFINITY;
     let spread = system
         .model()
-        .sample_deviation(single_sensor(system, group)?.sensors()[0]);
+        .sample_deviation(single_sensor(system, group)?.sensors[0]);
     for iteration in 1..=rule.max_iterations {
-        let old = single_sensor(&current, group)?.quantizer().clone();
+        let old = single_sensor(&current, group)?.quantizer.clone();
         let quantizer = alternating_step(&current, group, criterion)?;
         if rule.cells == AllowedCells::Intervals && !quantizer.is_contiguous() {
             return Err(Error::NotContiguous {
@@ -125,7 +125,7 @@ pub fn alternating_step(system: &System, group: usize, criterion: Criterion) -> 
     };
 
     let model = system.model();
-    let spread = model.sample_deviation(entry.sensors()[0]);
+    let spread = model.sample_deviation(entry.sensors[0]);
     let start = model.sample_mean() - REACH * spread;
     let step = 2.0 * REACH * spread / SCAN as f64;
     let (mut labels, mut breakpoints) = (vec![worth.best(start)], Vec::new());
@@ -138,7 +138,7 @@ pub fn alternating_step(system: &System, group: usize, criterion: Criterion) -> 
             labels.push(best);
         }
     }
-    let levels = entry.quantizer().levels();
+    let levels = entry.quantizer.levels();
     if let Some(cell) = (0..levels).find(|z| !labels.contains(z)) {
         return Err(Error::VanishingCell {
             quantizer: group,

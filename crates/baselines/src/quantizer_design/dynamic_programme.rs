@@ -35,10 +35,10 @@ pub fn best_contiguous(
     candidates: &[f64],
 ) -> Result<(Quantizer, f64), Error> {
     let entry = single_sensor(system, group)?;
-    if !entry.channel().is_ideal() {
+    if !entry.channel.is_ideal() {
         return refuse("channel", "not ideal", "an ideal channel: cell values do not add up behind a noisy one");
     }
-    let levels = entry.channel().inputs();
+    let levels = entry.channel.inputs();
     if candidates.len() + 1 < levels || candidates.len() > MAX_CANDIDATES {
         let count = format!("{} candidates", candidates.len());
         return refuse("candidates", count, format!("{} to {MAX_CANDIDATES} numbers", levels - 1));

@@ -18,8 +18,8 @@ const LOG_IMPOSSIBLE: f64 = -1e12;
 /// If there is no such group, or it has several sensors.
 pub(crate) fn single_sensor(system: &System, group: usize) -> Result<&SensorGroup, Error> {
     match system.groups().get(group) {
-        Some(entry) if entry.sensors().len() == 1 => Ok(entry),
-        Some(entry) => refuse("group", format!("{} sensors", entry.sensors().len()), "a group of a single sensor"),
+        Some(entry) if entry.sensors.len() == 1 => Ok(entry),
+        Some(entry) => refuse("group", format!("{} sensors", entry.sensors.len()), "a group of a single sensor"),
         None => refuse("group", group, format!("a number below {}", system.groups().len())),
     }
 }
@@ -54,7 +54,7 @@ impl LevelGains {
             inner *= if index > group { reports.rows() } else { 1 };
             others = others.outer(&reports);
         }
-        let (channel, values) = (entry.channel(), model.values().len());
+        let (channel, values) = (&entry.channel, model.values().len());
         let outputs = channel.outputs();
         // Log likelihoods, and the index of an outcome in their table.
         let (logs, is_by_group) = if model.prior().is_discrete() {
@@ -91,7 +91,7 @@ fn level_gains<'a>(
     channel: &Channel,
     log_likelihood: impl Fn(usize) -> &'a [f64],
 ) -> Table {
-    let (nodes, values) = (others.nodes(), model.values().len());
+    let (nodes, values) = (others.nodes, model.values().len());
     let mut per_symbol = vec![0.0; channel.outputs() * nodes];
     let mut score = vec![0.0; values];
     for at in 0..others.rows() * channel.outputs() {
@@ -101,12 +101,8 @@ fn level_gains<'a>(
         let out = &mut per_symbol[symbol * nodes..(symbol + 1) * nodes];
         for ((feature, w), s) in model.given().iter().zip(model.weights()).zip(&score) {
             let factor = w * s;
-            let range = feature.start()..feature.start() + feature.weights().len();
-            for ((out, p), report) in out[range.clone()]
-                .iter_mut()
-                .zip(feature.weights())
-                .zip(&reports[range])
-            {
+            let range = feature.start..feature.start + feature.weights.len();
+            for ((out, p), report) in out[range.clone()].iter_mut().zip(&feature.weights).zip(&reports[range]) {
                 *out += factor * p * report;
             }
         }

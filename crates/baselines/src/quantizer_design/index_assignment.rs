@@ -126,7 +126,11 @@ pub fn assign_words(
             let labelling = Labelling::with_words(bits, words.clone())?;
             let channel = Channel::binary_symmetric_with_gaps(&labelling, crossover)?;
             let sample = lloyd_max::gaussian(words.len())?.affine(model.sample_mean(), model.sample_deviation(n))?;
-            groups.push(SensorGroup::new(Quantizer::from(&sample), channel, vec![n])?);
+            groups.push(SensorGroup {
+                quantizer: Quantizer::from(&sample),
+                channel,
+                sensors: vec![n],
+            });
         }
         let words = combination.iter().map(|c| classes[*c].clone()).collect();
         if let Ok(design) = joint(&System::new(model.clone(), groups)?, criterion, &Newton::default()) {

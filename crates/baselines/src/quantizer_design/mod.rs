@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`alternate`], [`alternating_step`] | Algorithm 7: one sensor, with its stop rule corrected |
 //! | [`best_contiguous`] | the best intervals of one sensor on a grid, by dynamic programming |
+//! | [`greedy`] | section 4.4: one sensor after the other |
 //! | [`separate`], [`Separation`] | quantizers with the largest distance between two hypotheses (Poor and Thomas) |
 //! | [`assign_words`] | Table 4.5 for every assignment of words |
 //! | [`symmetry_breaking`] | the noise at which equal quantizers stop being an optimum |
@@ -12,12 +13,14 @@
 mod alternating;
 mod dynamic_programme;
 mod gains;
+mod greedy;
 mod index_assignment;
 mod separation;
 mod symmetry;
 
 pub use alternating::{Alternated, Alternating, alternate, alternating_step};
 pub use dynamic_programme::best_contiguous;
+pub use greedy::greedy;
 pub use index_assignment::{Words, WordsDesign, assign_words};
 pub use separation::{Separation, separate};
 pub use symmetry::symmetry_breaking;

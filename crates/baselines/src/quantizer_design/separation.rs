@@ -121,12 +121,12 @@ impl Objective for Separated<'_> {
             let (slope, bend) = self.distance.bend(p[0], p[1]);
             for i in 0..n {
                 let c = self.sensor.exchange[i][t];
-                let d = [c * densities[i][0], c * densities[i][1]];
+                let d = [0, 1].map(|x| c * densities.row(i)[x]);
                 gradient[i] += slope[0] * d[0] + slope[1] * d[1];
-                hessian[(i, i)] += c * (slope[0] * slopes[i][0] + slope[1] * slopes[i][1]);
+                hessian[(i, i)] += c * (slope[0] * slopes.row(i)[0] + slope[1] * slopes.row(i)[1]);
                 for j in 0..n {
                     let e = self.sensor.exchange[j][t];
-                    let e = [e * densities[j][0], e * densities[j][1]];
+                    let e = [0, 1].map(|x| e * densities.row(j)[x]);
                     let cross = bend[1] * (d[0] * e[1] + d[1] * e[0]);
                     hessian[(i, j)] += bend[0] * d[0] * e[0] + cross + bend[2] * d[1] * e[1];
                 }

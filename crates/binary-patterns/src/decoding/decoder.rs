@@ -107,7 +107,7 @@ impl Bank {
             Table::new(rows.concat(), points.len()).of_log_counts(count)
         };
         let tables: Vec<Table> = self.groups().map(of).collect();
-        for_each_log(&tables.iter().collect::<Vec<_>>(), &vec![0.0; points.len()], visit);
+        for_each_log(&tables, &vec![0.0; points.len()], visit);
     }
 }
 

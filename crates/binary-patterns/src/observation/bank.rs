@@ -178,7 +178,7 @@ impl Bank {
                 .of_counts(g.count)
         };
         let tables: Vec<Table> = self.groups.iter().map(counts).collect();
-        for_each(&tables.iter().collect::<Vec<_>>(), &nodes.w, visit);
+        for_each(&tables, &nodes.w, visit);
     }
 
     /// Index of the counts of a bit string; an error if its length is not the number of sensors.

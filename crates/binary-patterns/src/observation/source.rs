@@ -41,7 +41,7 @@ impl TryFrom<&Source> for Prior {
     fn try_from(source: &Source) -> Result<Self, Error> {
         match source.kind {
             Kind::Uniform { half_width } => Self::uniform(-half_width, half_width),
-            Kind::Gaussian { deviation } => Self::gaussian_with_deviation(deviation),
+            Kind::Gaussian { deviation } => Self::normal(0.0, deviation),
         }
     }
 }
@@ -146,25 +146,6 @@ impl Source {
         }
     }
 
-    /// Number of panels of width at most `width` and at most [`widest_panel`](Self::widest_panel).
-    fn panels(&self, from: f64, to: f64, width: f64) -> usize {
-        // Limited, so that very small noise does not need unbounded memory.
-        (((to - from) / width.min(self.widest_panel())).ceil() as usize).clamp(1, MAX_PANELS)
-    }
-
-    /// Composite Gauss-Legendre nodes over `[from, to]`, with the density included in the weights.
-    pub(crate) fn nodes_between(&self, from: f64, to: f64, width: f64, rule: &Rule) -> Nodes {
-        let mut nodes = Nodes::default();
-        nodes.extend(self, from, to, width, rule);
-        nodes
-    }
-
-    /// The same over the whole support, for noise so large that the bits are uncertain everywhere.
-    #[doc(hidden)]
-    pub fn nodes(&self, width: f64, rule: &Rule) -> Nodes {
-        self.nodes_between(-self.reach(), self.reach(), width, rule)
-    }
-
     /// An error if the noise is too small for an even grid of nodes.
     #[doc(hidden)]
     pub fn resolvable(&self, noise_deviation: f64) -> Result<f64, Error> {
@@ -177,9 +158,7 @@ impl Source {
     }
 }
 
-/// Largest number of panels: enough for 75 dB if all of the support must be resolved.
-const MAX_PANELS: usize = 20_000;
-/// The smallest noise, as a fraction of the support, that an even grid of so many panels resolves.
+/// The smallest noise, as a fraction of the support, that an even grid of nodes resolves.
 const FINEST: f64 = 1e-4;
 /// Beyond this many noise standard deviations from a threshold the bit is certain to `1e-50`.
 const ZONE: f64 = 15.0;
@@ -213,14 +192,6 @@ pub struct Nodes {
 }
 
 impl Nodes {
-    /// Adds the nodes of the interval `[from, to]`.
-    pub(crate) fn extend(&mut self, source: &Source, from: f64, to: f64, width: f64, rule: &Rule) {
-        for (x, w) in rule.panels(from, to, source.panels(from, to, width)) {
-            self.x.push(x);
-            self.w.push(w * source.density(x));
-        }
-    }
-
     /// Number of nodes.
     pub fn len(&self) -> usize {
         self.x.len()
@@ -280,18 +251,6 @@ mod tests {
     use approx::assert_relative_eq;
     use fewbits_numerics::normal::cdf;
     use fewbits_numerics::quadrature::gauss_legendre;
-
-    #[test]
-    fn nodes_carry_mass_and_variance() {
-        for source in [
-            Source::uniform(1.3).unwrap(),
-            Source::gaussian_with_deviation(0.4).unwrap(),
-        ] {
-            let nodes = source.nodes(0.2, gauss_legendre::<12>());
-            assert_relative_eq!(nodes.expectation(|_| 1.0), 1.0, max_relative = 1e-14);
-            assert_relative_eq!(nodes.expectation(|x| x * x), source.variance(), max_relative = 1e-14);
-        }
-    }
 
     #[test]
     fn adapted_nodes_do_not_grow_as_the_noise_vanishes() {

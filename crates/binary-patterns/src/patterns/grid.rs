@@ -1,16 +1,13 @@
 //! Cells of the measurement axis.
 
 use crate::Error;
-use crate::observation::source::{Kind, Source};
+use crate::observation::source::Source;
 use fewbits_numerics::error::{positive, refuse};
 use fewbits_quantizers::quantizer::{cell_of, check_increasing};
 use serde::{Deserialize, Serialize};
 
 /// Largest number of bits of a cell index.
 pub(crate) const MAX_BITS: usize = 16;
-
-/// Interior edges of the eight-level Lloyd-Max quantizer of `N(0, 1)` with the four digits that Max (1960) prints.
-const MAX_EIGHT_LEVEL_EDGES: [f64; 7] = [-1.748, -1.05, -0.5006, 0.0, 0.5006, 1.05, 1.748];
 
 /// Interior edges `t_1 < ... < t_{L-1}` that divide the axis into `L` cells; the outer cells are unbounded.
 ///
@@ -73,15 +70,6 @@ impl CellGrid {
         Self::from_breakpoints(table.breakpoints().iter().map(|t| t * deviation).collect())
     }
 
-    /// The Gaussian grid of eight cells with the four digits that Max (1960) prints, for reproducing published results.
-    ///
-    /// # Errors
-    /// If `deviation` is not positive and finite.
-    pub fn printed_gaussian(deviation: f64) -> Result<Self, Error> {
-        let deviation = positive("deviation", deviation)?;
-        Self::from_breakpoints(MAX_EIGHT_LEVEL_EDGES.iter().map(|t| t * deviation).collect())
-    }
-
     /// The interior edges.
     pub fn breakpoints(&self) -> &[f64] {
         &self.breakpoints
@@ -118,29 +106,6 @@ impl CellGrid {
         };
         let high = self.breakpoints.get(cell).copied().unwrap_or(reach).min(reach);
         (low < high).then_some((low, high))
-    }
-
-    /// Mean squared error of the cell centroids without measurement noise; `Delta^2/12` for a uniform source on its grid.
-    pub fn noiseless_mse(&self, source: &Source) -> f64 {
-        let rule = fewbits_numerics::quadrature::gauss_legendre::<24>();
-        (0..self.cells())
-            .filter_map(|cell| self.support(cell, source))
-            .map(|(low, high)| {
-                // A uniform density is a polynomial, so one panel is exact.
-                let width = match source.kind() {
-                    Kind::Uniform { .. } => high - low,
-                    Kind::Gaussian { deviation } => deviation,
-                };
-                let nodes = source.nodes_between(low, high, width, rule);
-                let mass = nodes.expectation(|_| 1.0);
-                let centroid = nodes.expectation(|x| x) / mass;
-                if mass > 0.0 {
-                    nodes.expectation(|x| (x - centroid) * (x - centroid))
-                } else {
-                    0.0
-                }
-            })
-            .sum()
     }
 }
 
@@ -180,21 +145,12 @@ mod tests {
     }
 
     #[test]
-    fn noiseless_error_is_the_textbook_one() {
-        let uniform = CellGrid::uniform(1.0, 3)
-            .unwrap()
-            .noiseless_mse(&Source::uniform(1.0).unwrap());
-        assert_relative_eq!(uniform, 0.25 * 0.25 / 12.0, max_relative = 1e-12);
-        let source = Source::gaussian_with_deviation(0.7).unwrap();
-        let exact = 0.49
-            * fewbits_quantizers::lloyd_max::gaussian_table(3)
-                .unwrap()
-                .mean_squared_error();
-        let optimal = CellGrid::lloyd_max(0.7, 3).unwrap().noiseless_mse(&source);
-        assert_relative_eq!(optimal, exact, max_relative = 1e-10);
-        // Four printed digits cost next to nothing at a minimum.
-        let printed = CellGrid::printed_gaussian(0.7).unwrap().noiseless_mse(&source);
-        assert!(printed > exact && printed < exact * (1.0 + 1e-5));
+    fn lloyd_max_cells_scale_with_the_deviation() {
+        let table = fewbits_quantizers::lloyd_max::gaussian_table(3).unwrap();
+        let grid = CellGrid::lloyd_max(0.7, 3).unwrap();
+        for (edge, standard) in grid.breakpoints().iter().zip(table.breakpoints()) {
+            assert_relative_eq!(*edge, 0.7 * standard, max_relative = 1e-15);
+        }
     }
 
     #[test]

@@ -88,20 +88,6 @@ pub fn rank(masks: &[Mask]) -> usize {
     masks.iter().fold(Span::default(), |span, &mask| span.with(mask)).rank()
 }
 
-/// The generator matrix, one row per cell and one column per sensor: entry `(l, n)` is the bit of sensor `n` for cell `l`.
-///
-/// # Errors
-/// As [`linear_pattern`], for any mask.
-pub fn generator_matrix(masks: &[Mask], bits: usize) -> Result<Vec<Vec<bool>>, Error> {
-    let columns = masks
-        .iter()
-        .map(|&mask| linear_pattern(mask, bits))
-        .collect::<Result<Vec<_>, _>>()?;
-    Ok((0..1 << bits_in_range(bits)?)
-        .map(|cell| columns.iter().map(|p| p.bits()[cell]).collect())
-        .collect())
-}
-
 /// The mask of a pattern over `2^bits` cells, if it is linear.
 pub fn mask_of(pattern: &Pattern) -> Option<Mask> {
     let cells = pattern.cells();
@@ -151,16 +137,6 @@ mod tests {
         assert_eq!(gray_basis(4).unwrap(), [8, 12, 6, 3]);
         assert_eq!(strings(&[4, 2, 1], 3), ["00001111", "00110011", "01010101"]);
         assert_eq!(strings(&[14, 5, 11], 4), ["0011110011000011", "0101101001011010", "0110011010011001"]);
-    }
-
-    #[test]
-    fn adjacent_rows_of_the_gray_generator_differ_in_one_bit() {
-        for bits in 1..=8 {
-            let rows = generator_matrix(&gray_basis(bits).unwrap(), bits).unwrap();
-            for pair in rows.windows(2) {
-                assert_eq!(pair[0].iter().zip(&pair[1]).filter(|(a, b)| a != b).count(), 1);
-            }
-        }
     }
 
     #[test]

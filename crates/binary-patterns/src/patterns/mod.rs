@@ -1,6 +1,5 @@
-//! Patterns: the grid of cells, the bit for each cell, and the number of patterns.
+//! Patterns: the grid of cells, and the bit for each cell.
 
-pub mod count;
 pub(crate) mod grid;
 pub(crate) mod linear;
 pub(crate) mod pattern;

@@ -1,7 +1,6 @@
 //! Optimal thresholds without a grid, by Newton's method on the exact error.
 
-use crate::patterns::linear::sensors_of;
-use crate::{Bank, BinaryQuantizer, CellGrid, Error, Mask, PatternSensor, Source};
+use crate::{Bank, BinaryQuantizer, Error, PatternSensor, Source};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::error::{at_least_one, non_negative, refuse};
 use fewbits_quantizer_design::{Criterion, Newton, Noise, ObservationModel, Prior, Quantizer, System, design};
@@ -80,21 +79,6 @@ pub fn free_breakpoints(
     Ok(best)
 }
 
-/// As [`free_breakpoints`], started from the patterns of `masks` on `grid`, one per sensor.
-///
-/// # Errors
-/// As [`free_breakpoints`], and if a mask is out of the grid's range.
-pub fn free_breakpoints_of_masks(
-    source: &Source,
-    grid: &CellGrid,
-    masks: &[Mask],
-    noise_deviation: f64,
-    jitter: f64,
-    starts: usize,
-) -> Result<FreeDesign, Error> {
-    free_breakpoints(source, &sensors_of(masks, grid, noise_deviation)?, jitter, starts)
-}
-
 /// The thresholds that Newton's method reaches from these, without cells whose thresholds have met.
 fn settled(model: &ObservationModel, mut thresholds: Vec<Vec<f64>>) -> Result<Vec<BinaryQuantizer>, Error> {
     loop {
@@ -122,6 +106,8 @@ fn settled(model: &ObservationModel, mut thresholds: Vec<Vec<f64>>) -> Result<Ve
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::CellGrid;
+    use crate::patterns::linear::sensors_of;
     use approx::assert_relative_eq;
 
     fn sensors() -> Vec<PatternSensor> {
@@ -138,8 +124,8 @@ mod tests {
             let source = Source::uniform(v).unwrap();
             let grid = CellGrid::uniform(v, 3).unwrap();
             let noise = source.noise_deviation(5.0).unwrap();
-            let found = free_breakpoints_of_masks(&source, &grid, &[4, 4, 6], noise, 0.05, 2).unwrap();
-            let start = sensors_of(&[4], &grid, noise).unwrap();
+            let start = sensors_of(&[4, 4, 6], &grid, noise).unwrap();
+            let found = free_breakpoints(&source, &start, 0.05, 2).unwrap();
             assert!(found.sensors.iter().any(|s| *s != start[0]));
             (found.mse / (v * v), found.sensors[2].quantizer().breakpoints()[0] / v)
         };

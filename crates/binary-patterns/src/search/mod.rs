@@ -14,4 +14,4 @@ mod outcomes;
 
 pub use descent::{Descended, Descent};
 pub use exhaustive::{LinearSearch, MaskSet};
-pub use free::{FreeDesign, free_breakpoints, free_breakpoints_of_masks};
+pub use free::{FreeDesign, free_breakpoints};

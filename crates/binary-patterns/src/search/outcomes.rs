@@ -45,7 +45,7 @@ impl Outcomes {
     pub(crate) fn integrals<S: Storage<f64, Dyn, Dyn>>(&self, functions: &Matrix<f64, Dyn, Dyn, S>) -> Vec<f64> {
         let (rows, outcomes) = (functions.nrows(), self.mirror.len());
         let mut sums = vec![0.0; rows * outcomes];
-        let w = DMatrixView::from_slice(self.w.values(), functions.ncols(), outcomes);
+        let w = DMatrixView::from_slice(&self.w.values, functions.ncols(), outcomes);
         DMatrixViewMut::from_slice(&mut sums, rows, outcomes).gemm(1.0, functions, &w, 0.0);
         sums
     }

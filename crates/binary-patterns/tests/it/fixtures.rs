@@ -1,17 +1,16 @@
 //! Every entry of the fixture file, computed by independent programs, against the library.
 
 use crate::entry::{Entry, check};
-use fewbits_baselines::binary_patterns::by_information;
 use fewbits_baselines::binary_patterns::{
-    AdaptiveErrors, AdaptiveRule, Decoder, Luo, adaptive, count as printed_count, fixed_threshold,
-    multi_threshold_bound, printed_crlb,
+    AdaptiveErrors, AdaptiveRule, Decoder, Luo, adaptive, by_information, count, fixed_threshold,
+    multi_threshold_bound, printed_crlb, printed_gaussian_cells,
 };
 use fewbits_binary_patterns::bounds::{
     centralised_bound, network_rate_distortion, optimal_weight_van_trees, remote_distortion,
 };
 use fewbits_binary_patterns::search::{LinearSearch, MaskSet, free_breakpoints};
 use fewbits_binary_patterns::{
-    Bank, CellGrid, Mask, Pattern, PatternSensor, Source, count, gray_basis, linear_pattern, natural_basis,
+    Bank, CellGrid, Mask, Pattern, PatternSensor, Source, gray_basis, linear_pattern, natural_basis,
 };
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -29,7 +28,7 @@ fn gauss() -> Source {
 }
 
 fn gauss_grid() -> CellGrid {
-    CellGrid::printed_gaussian(0.1f64.sqrt()).unwrap()
+    printed_gaussian_cells(0.1f64.sqrt()).unwrap()
 }
 
 fn grid(bits: usize) -> CellGrid {
@@ -123,11 +122,11 @@ fn counts() {
         let sensors = e.inputs["N"].as_u64().unwrap_or(0) as usize;
         let name = e.id.split('.').nth(1).unwrap();
         let count = match name {
-            "omega1" => printed_count::unordered_bases(bits),
-            "omega2_print" => printed_count::printed_pattern_sets(bits, sensors),
+            "omega1" => count::unordered_bases(bits),
+            "omega2_print" => count::printed_pattern_sets(bits, sensors),
             "multisets" => count::full_rank_multisets(bits, sensors),
-            "labelings" => printed_count::bijective_labelings(bits),
-            "labelings_mod_reflection" => printed_count::bijective_labelings_up_to_reflection(bits),
+            "labelings" => count::bijective_labelings(bits),
+            "labelings_mod_reflection" => count::bijective_labelings_up_to_reflection(bits),
             "triples" => count::multisets(Pattern::all(8).unwrap().len() as u128, 3),
             other => panic!("unknown count {other}"),
         };

@@ -1,6 +1,6 @@
 //! Wild arguments: sources, grids, quantizers and banks answer numbers or errors.
 
-use fewbits_baselines::binary_patterns::bounded_mle;
+use fewbits_baselines::binary_patterns::{bounded_mle, printed_gaussian_cells};
 use fewbits_binary_patterns::bounds::{centralised_bound, remote_distortion};
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, CellGrid, PatternSensor, Source};
 use fewbits_core::{Link, Observation, Scheme, factor::Factor, laws::wild};
@@ -25,7 +25,7 @@ proptest! {
                 prop_assert!(!number.is_nan() && number >= 0.0, "{:?} {}: {}", source, x[1], number);
             }
         }
-        for grid in [CellGrid::uniform(x[0], bits), CellGrid::from_breakpoints(x[..count].to_vec()), CellGrid::lloyd_max(x[0], bits), CellGrid::printed_gaussian(x[0])].into_iter().flatten() {
+        for grid in [CellGrid::uniform(x[0], bits), CellGrid::from_breakpoints(x[..count].to_vec()), CellGrid::lloyd_max(x[0], bits), printed_gaussian_cells(x[0])].into_iter().flatten() {
             prop_assert!(grid.breakpoints().iter().all(|b| b.is_finite()), "{:?}", grid);
             let _ = grid.locate(x[1]);
         }

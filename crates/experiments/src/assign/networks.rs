@@ -1,9 +1,8 @@
 //! `assign-fig6-3` and `assign-fig6-4`: random networks of given mean and spread of their noise variances.
 
 use crate::prelude::*;
-use fewbits_sensor_assignment::{
-    CodedSensors, Estimator, all_errors, by_precision, exchange, pair_costs, variances_with_moments,
-};
+use fewbits_baselines::sensor_assignment::{all_errors, by_precision, variances_with_moments};
+use fewbits_sensor_assignment::{CodedSensors, Estimator, exchange, pair_costs};
 use rand_distr::{Distribution, StandardNormal};
 
 /// Least variance of a sensor in a random network.

@@ -1,7 +1,8 @@
 //! `assign-fig6-1` and `assign-figC-1`: where a wrong bit lands, and how likely it is.
 
 use crate::prelude::*;
-use fewbits_sensor_assignment::{CodedSensors, bit_error, flipped_estimate};
+use fewbits_baselines::sensor_assignment::{bit_error, flipped_estimate};
+use fewbits_sensor_assignment::CodedSensors;
 
 const BITS: usize = 4;
 

@@ -1,7 +1,8 @@
 //! `assign-table6-1`: eight sensors, three assignments.
 
 use crate::prelude::*;
-use fewbits_sensor_assignment::{CodedSensors, Estimator, all_errors, by_precision, pair_costs, quantization_error};
+use fewbits_baselines::sensor_assignment::{all_errors, by_precision};
+use fewbits_sensor_assignment::{CodedSensors, Estimator, pair_costs, quantization_error};
 
 pub struct Table;
 

@@ -12,6 +12,7 @@ pub(crate) mod table5_1;
 pub(crate) mod table5_2;
 
 use crate::prelude::*;
+use fewbits_baselines::binary_patterns::printed_gaussian_cells;
 use fewbits_binary_patterns::search::{Descent, LinearSearch};
 use fewbits_binary_patterns::{Bank, CellGrid, Mask, Pattern, Source, linear_pattern, rank};
 
@@ -41,7 +42,7 @@ impl Scene {
     fn gaussian(snr_db: f64) -> Result<Self, Error> {
         let std = GAUSSIAN_VARIANCE.sqrt();
         let source = Source::gaussian_with_deviation(std)?;
-        let grid = CellGrid::printed_gaussian(std)?;
+        let grid = printed_gaussian_cells(std)?;
         Self::new(source, grid, snr_db)
     }
 

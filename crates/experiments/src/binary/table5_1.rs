@@ -2,10 +2,10 @@
 
 use super::{Scene, pattern, pattern_panel};
 use crate::prelude::*;
+use fewbits_baselines::binary_patterns::count::full_rank_multisets;
 use fewbits_baselines::binary_patterns::{Decoder, count, printed_crlb};
 use fewbits_binary_patterns::Mask;
 use fewbits_binary_patterns::bounds::optimal_weight_van_trees;
-use fewbits_binary_patterns::count::full_rank_multisets;
 use fewbits_binary_patterns::search::MaskSet;
 
 pub struct Table;

@@ -12,7 +12,7 @@ pub(super) const MSE: Criterion = Criterion::MeanSquaredError;
 
 /// A standard normal unknown in noise of these standard deviations and this common correlation.
 pub(super) fn scene(sds: &[f64], rho: f64) -> Result<ObservationModel, Refused> {
-    ObservationModel::new(Prior::gaussian_with_deviation(1.0)?, Noise::equicorrelated_with_deviations(sds, rho)?)
+    ObservationModel::new(Prior::normal(0.0, 1.0)?, Noise::equicorrelated_with_deviations(sds, rho)?)
 }
 
 /// A Lloyd-Max quantizer of a normal variable at every sensor, its standard deviation as `sd` says.

@@ -45,13 +45,8 @@ rows! {
     }
 }
 
-fn first_alone(both: &System) -> Result<System, Error> {
-    let group = both.groups()[0].clone();
-    Ok(System::new(both.model().subset(&[0])?, vec![group])?)
-}
-
 fn step(crossover: f64, [iteration, stage, iter_in_stage]: [usize; 3], both: &System) -> Result<Step, Error> {
-    let (one, two) = (first_alone(both)?.value(MI)?, both.value(MI)?);
+    let (one, two) = (both.subset(&[0])?.value(MI)?, both.value(MI)?);
     Ok(Step {
         crossover,
         iteration,
@@ -198,7 +193,7 @@ impl Figure for Iterations {
             for k in 1..=2 * steps {
                 let sensor = usize::from(k > steps);
                 let quantizer = match sensor {
-                    0 => baselines::alternating_step(&first_alone(&chain)?, 0, MI)?,
+                    0 => baselines::alternating_step(&chain.subset(&[0])?, 0, MI)?,
                     _ => baselines::alternating_step(&chain, sensor, MI)?,
                 };
                 chain = chain.with_quantizer(sensor, quantizer)?;

@@ -2,6 +2,7 @@
 
 use super::common::{MI, MSE, Pair, arrived, errors, lloyd_system, odd, scene};
 use crate::prelude::*;
+use fewbits_baselines::quantizer_design as baselines;
 use fewbits_quantizer_design::{Newton, bounds, design};
 
 parameters! {
@@ -74,7 +75,7 @@ impl Figure for Table41 {
             let sample = lloyd_system(&scene, levels, |n| scene.sample_deviation(n))?;
             for (criterion, method, printed) in [(MI, "mi", printed[0]), (MSE, "mse", printed[1])] {
                 context.check()?;
-                let greedy = design::greedy(&sample, &[0, 1], criterion, &newton)?.swap_remove(1);
+                let greedy = baselines::greedy(&sample, &[0, 1], criterion, &newton)?.swap_remove(1);
                 push(method, "greedy", Pair::of(&greedy.system)?);
                 let nearest = design::joint(&greedy.system, criterion, &Newton::to_nearest_stationary_point())?;
                 let best = design::multi_start(&sample, criterion, p.starts, 1, &newton)?;

@@ -2,6 +2,7 @@
 
 use super::common::{MI, MSE, Pair, arrived, errors, lloyd_system, odd, scene};
 use crate::prelude::*;
+use fewbits_baselines::quantizer_design as baselines;
 use fewbits_quantizer_design::{Newton, bounds, design};
 
 parameters! {
@@ -63,8 +64,8 @@ impl Figure for Table42 {
                 (MI, "mi-greedy", "mi-greedy-better-first", "mi-joint"),
                 (MSE, "mse-greedy", "mse-greedy-better-first", "mse-joint"),
             ] {
-                push(greedy, Pair::of(&design::greedy(&sample, &[0, 1], criterion, &newton)?[1].system)?);
-                let mut quantizers = design::greedy(&sample, &[1, 0], criterion, &newton)?[1].quantizers();
+                push(greedy, Pair::of(&baselines::greedy(&sample, &[0, 1], criterion, &newton)?[1].system)?);
+                let mut quantizers = baselines::greedy(&sample, &[1, 0], criterion, &newton)?[1].quantizers();
                 quantizers.reverse();
                 push(reversed, Pair::of(&sample.with_quantizers(quantizers)?)?);
                 let best = design::joint(&sample, criterion, &newton)?;

@@ -2,6 +2,7 @@
 
 use super::common::{MI, MSE, outer, scene};
 use crate::prelude::*;
+use fewbits_baselines::quantizer_design as baselines;
 use fewbits_quantizer_design::{Newton, Quantizer, System, bounds, design, lloyd_max};
 
 parameters! {
@@ -97,7 +98,7 @@ impl Figure for Table43 {
         let order: Vec<usize> = (0..p.sensors).collect();
         let start = System::ideal(scene.clone(), vec![Quantizer::symmetric(sample)?; p.sensors])?;
         for (criterion, method, by) in [("mi", "mi-greedy", MI), ("mse", "mse-greedy", MSE)] {
-            for (i, stage) in design::greedy(&start, &order, by, &newton)?.iter().enumerate() {
+            for (i, stage) in baselines::greedy(&start, &order, by, &newton)?.iter().enumerate() {
                 chain.push(Stage {
                     criterion,
                     stage: i + 1,

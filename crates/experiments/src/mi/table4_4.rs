@@ -128,7 +128,7 @@ impl Figure for Table44 {
             }
             let apart = System::ideal(scene(signal, p.sensors)?, vec![start; p.sensors])?;
             let order: Vec<usize> = (0..p.sensors).collect();
-            if let Some(chain) = design::greedy(&apart, &order, MI, &newton)?.pop() {
+            if let Some(chain) = baselines::greedy(&apart, &order, MI, &newton)?.pop() {
                 rows.designs.push(row(p, signal, "mi-greedy", &chain.system)?);
             }
             // Person by person from the identical minimum: no sensor alone can do better.

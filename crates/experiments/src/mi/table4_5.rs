@@ -2,6 +2,7 @@
 
 use super::common::{MI, MSE, Pair, lloyd_system, odd, over_bsc, scene};
 use crate::prelude::*;
+use fewbits_baselines::quantizer_design as baselines;
 use fewbits_quantizer_design::{Newton, System, design};
 
 /// Name, title and words of the four levels.
@@ -67,7 +68,7 @@ impl Figure for Table45 {
                 };
                 let start = p.start(&words, crossover)?;
                 for (criterion, greedy, both) in [(MI, "mi-greedy", "mi-joint"), (MSE, "mse-greedy", "mse-joint")] {
-                    push(greedy, Pair::of(&design::greedy(&start, &[0, 1], criterion, &newton)?[1].system)?);
+                    push(greedy, Pair::of(&baselines::greedy(&start, &[0, 1], criterion, &newton)?[1].system)?);
                     push(both, Pair::joint(&design::joint(&start, criterion, &newton)?)?);
                 }
                 if let Some((_, outer)) = PRINTED.iter().find(|print| print.0 == crossover) {

@@ -253,7 +253,7 @@ mod tests {
             (5, 4.0, 0.4),
             (1, 1.0, 3.0),
         ] {
-            let two = Prior::gaussian_with_deviation(2f64.sqrt()).unwrap();
+            let two = Prior::normal(0.0, 2f64.sqrt()).unwrap();
             let bound = ceo(&two, &noise_of(&vec![2.0 / snr; n]), &vec![bits; n]).unwrap();
             assert!(bound.gap < 1e-6 && bound.lower() <= bound.distortion, "{bound:?}");
             let found = bound.distortion;

@@ -24,7 +24,12 @@ pub fn mean_fisher_information(system: &System) -> Result<f64, Error> {
         for (t, p) in entry.symbols(entry.breakpoints()).iter().enumerate() {
             for (k, total) in information.iter_mut().enumerate() {
                 // Raising x by an amount has the same effect as lowering all breakpoints by it.
-                let slope: f64 = entry.exchange.iter().zip(&densities).map(|(c, d)| c[t] * d[k]).sum();
+                let slope: f64 = entry
+                    .exchange
+                    .iter()
+                    .zip(densities.iter())
+                    .map(|(c, d)| c[t] * d[k])
+                    .sum();
                 if p[k] > 0.0 {
                     *total += entry.compositions.total as f64 * slope * (slope / p[k]);
                 }

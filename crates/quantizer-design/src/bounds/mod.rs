@@ -59,7 +59,7 @@ mod tests {
     use super::*;
 
     pub(super) fn unit() -> Prior {
-        Prior::gaussian_with_deviation(1.0).unwrap()
+        Prior::normal(0.0, 1.0).unwrap()
     }
 
     pub(super) fn noise_of(variances: &[f64]) -> Noise {

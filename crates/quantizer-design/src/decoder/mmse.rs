@@ -1,11 +1,11 @@
 //! The posterior mean as a look-up table.
 
 use crate::error::{Error, refuse};
-use crate::law::{Reports, symbol_tables};
+use crate::law::{report_tables, symbol_tables};
 use crate::observation_model::ObservationModel;
-use crate::outcomes::{Feature, Table, dot};
+use crate::outcomes::{Table, for_each};
 use crate::system::System;
-use crate::table::{JointTable, Layout};
+use crate::table::Layout;
 use fewbits_core::Observation;
 use fewbits_numerics::error::entries;
 use fewbits_quantizers::Symbol;
@@ -80,13 +80,9 @@ impl MmseDecoder {
         let allowed = system
             .clone()
             .with_outcome_limit(system.outcome_limit().max(limit as u64));
-        let entries = match JointTable::new(&allowed) {
-            Ok(table) => (0..table.outcomes())
-                .map(|outcome| posterior(model, table.likelihood(outcome)))
-                .collect(),
-            Err(Error::TooLarge { .. }) => Self::entries_by_moments(model, &Reports::of(&allowed)?),
-            Err(error) => return Err(error),
-        };
+        let mut entries = Vec::new();
+        let visit = |_, product: &[f64]| entries.push(posterior(model, product));
+        for_each(&report_tables(&allowed)?, &vec![1.0; model.nodes()], visit);
         Ok(Self {
             layout: Layout::new(system),
             system: system.clone(),
@@ -96,33 +92,13 @@ impl MmseDecoder {
         })
     }
 
-    /// Variances as differences of moments about the prior mean; used if a table of all likelihoods would be too large.
-    fn entries_by_moments(model: &ObservationModel, reports: &Reports) -> Vec<[f64; 3]> {
-        let mut square = vec![0.0; model.nodes()];
-        for ((given, w), x) in model.given.iter().zip(&model.weights).zip(&model.values) {
-            for (i, p) in given.weights.iter().enumerate() {
-                square[given.start + i] += w * (x - model.mean) * (x - model.mean) * p;
-            }
-        }
-        let features = [model.mass.clone(), model.moment.clone(), Feature::of_all(square)];
-        let entry = |m: &[f64]| {
-            if m[0] > 0.0 {
-                let off = m[1] / m[0];
-                [m[0], model.mean + off, (m[2] / m[0] - off * off).max(0.0)]
-            } else {
-                [0.0, model.mean, model.variance]
-            }
-        };
-        reports.moments(&features).chunks_exact(3).map(entry).collect()
-    }
-
     /// Number of entries, one per joint outcome.
     pub fn outcomes(&self) -> usize {
         self.entries.len()
     }
 
     /// The estimate of every joint outcome; `None` for an outcome of probability zero. The order is that of
-    /// [`JointTable::outcome`]: the first group varies slowest, and groups of one sensor are ordered by symbol.
+    /// [`JointTable::outcome`](crate::table::JointTable::outcome): the first group varies slowest, and groups of one sensor are ordered by symbol.
     pub fn estimates(&self) -> impl ExactSizeIterator<Item = Option<Estimate>> + '_ {
         self.entries.iter().map(|entry| Self::estimate(*entry).ok())
     }
@@ -142,7 +118,7 @@ impl MmseDecoder {
         entries("observations", observations.len(), model.sensors())?;
         let mut product = vec![1.0; model.nodes()];
         for (group, symbols) in self.system.groups().iter().zip(&self.symbols) {
-            for symbol in group.sensors().iter().filter_map(|n| observations[*n].received()) {
+            for symbol in group.sensors.iter().filter_map(|n| observations[*n].received()) {
                 if symbol.0 >= symbols.rows() {
                     return refuse("symbol", symbol.0, format!("a number below {}", symbols.rows()));
                 }
@@ -154,12 +130,7 @@ impl MmseDecoder {
                 }
             }
         }
-        let q: Vec<f64> = model
-            .given
-            .iter()
-            .map(|f| dot(&f.weights, &product[f.start..f.start + f.weights.len()]))
-            .collect();
-        Self::estimate(posterior(model, &q))
+        Self::estimate(posterior(model, &product))
     }
 
     /// The estimate if symbol `symbols[n]` was received from sensor `n`.
@@ -179,9 +150,10 @@ impl MmseDecoder {
     }
 }
 
-/// Probability, posterior mean and variance from the likelihoods of the values, computed as sums of positive terms.
+/// Probability, posterior mean and variance from the likelihood at the nodes, computed as sums of positive terms.
 fn posterior(model: &ObservationModel, likelihood: &[f64]) -> [f64; 3] {
-    let terms = || model.weights.iter().zip(likelihood).zip(&model.values);
+    let given: Vec<f64> = model.given.iter().map(|feature| feature.of(likelihood)).collect();
+    let terms = || model.weights.iter().zip(&given).zip(&model.values);
     let mass: f64 = terms().map(|((w, q), _)| w * q).sum();
     if mass <= 0.0 {
         return [0.0, model.mean, model.variance];
@@ -225,7 +197,7 @@ mod tests {
     fn an_erased_symbol_leaves_the_posterior_of_the_others() {
         for rho in [0.0, 0.5] {
             let noise = Noise::equicorrelated_with_deviations(&[1.0; 3], rho).unwrap();
-            let model = ObservationModel::new(Prior::gaussian_with_deviation(1.0).unwrap(), noise).unwrap();
+            let model = ObservationModel::new(Prior::normal(0.0, 1.0).unwrap(), noise).unwrap();
             let q = Quantizer::symmetric(1.2).unwrap();
             let system = System::identical(model.clone(), q.clone()).unwrap();
             let decoder = MmseDecoder::new(&system, 20).unwrap();

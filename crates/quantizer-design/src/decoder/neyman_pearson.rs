@@ -175,7 +175,6 @@ mod tests {
         let sum = table.equivocation().unwrap() + system.value(Criterion::MutualInformation).unwrap();
         assert!((sum - entropy).abs() < 1e-14);
         assert_eq!(table.outcome(&[0, 1, 0]), table.outcome(&[1, 0, 0]));
-        assert_eq!(table.multiplicity(table.outcome(&[0, 1, 0]).unwrap()), 3.0);
         assert!(table.likelihood(usize::MAX).is_empty() && table.probability(usize::MAX) == 0.0);
     }
 }

@@ -27,14 +27,14 @@ pub(super) struct Opposed {
 /// [`Error::TooLarge`] if treating two sensors as different makes more outcomes than the system allows.
 pub(super) fn opposed(system: &System, group: usize, criterion: Criterion) -> Result<Option<Opposed>, Error> {
     let entry = system.group(group)?;
-    let [first, second, rest @ ..] = entry.sensors() else {
+    let [first, second, rest @ ..] = entry.sensors.as_slice() else {
         return Ok(None);
     };
     let parts = [vec![*first], vec![*second], rest.to_vec()];
     let apart = regrouped(system, group, parts.into_iter().filter(|p| !p.is_empty()))?;
     let problem = Problem::new(&apart, criterion, &[group, group + 1])?;
     let hessian = problem.derivatives(&problem.start()).hessian;
-    let n = entry.quantizer().breakpoints().len();
+    let n = entry.quantizer.breakpoints().len();
     let difference = hessian.view((0, 0), (n, n)) - hessian.view((0, n), (n, n));
     let eigen = SymmetricEigen::new((&difference + difference.transpose()) * 0.5);
     let top = eigen.eigenvalues.imax();
@@ -47,13 +47,13 @@ pub(super) fn opposed(system: &System, group: usize, criterion: Criterion) -> Re
 /// The system with `group` split into two halves that are moved in opposite directions along `direction`, by at most `length`.
 pub(super) fn halved(system: &System, group: usize, direction: &DVector<f64>, length: f64) -> Result<System, Error> {
     let entry = system.group(group)?;
-    let (one, other) = entry.sensors().split_at(entry.sensors().len() / 2);
+    let (one, other) = entry.sensors.split_at(entry.sensors.len() / 2);
     let apart = regrouped(system, group, [one.to_vec(), other.to_vec()].into_iter())?;
     let step = length / direction.amax();
     let moved = |share: f64| {
-        let breakpoints = entry.quantizer().breakpoints().iter().zip(direction);
+        let breakpoints = entry.quantizer.breakpoints().iter().zip(direction);
         entry
-            .quantizer()
+            .quantizer
             .with_breakpoints(breakpoints.map(|(b, d)| b + share * step * d).collect())
     };
     // The mean over all sensors stays, so the smaller half moves further.
@@ -73,7 +73,10 @@ pub(super) fn halved(system: &System, group: usize, direction: &DVector<f64>, le
 fn regrouped(system: &System, group: usize, parts: impl Iterator<Item = Vec<usize>>) -> Result<System, Error> {
     let entry = system.group(group)?;
     let mut groups = system.groups().to_vec();
-    let parts = parts.map(|sensors| SensorGroup::new(entry.quantizer().clone(), entry.channel().clone(), sensors));
-    groups.splice(group..=group, parts.collect::<Result<Vec<_>, _>>()?);
-    Ok(System::new(system.model().clone(), groups)?.with_outcome_limit(system.outcome_limit()))
+    let parts = parts.map(|sensors| SensorGroup {
+        sensors,
+        ..entry.clone()
+    });
+    groups.splice(group..=group, parts);
+    system.with_groups(groups)
 }

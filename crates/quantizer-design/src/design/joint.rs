@@ -3,7 +3,7 @@
 use super::apart::{Opposed, halved, opposed};
 use crate::criterion::Criterion;
 use crate::deadline::Deadline;
-use crate::error::{Error, refuse};
+use crate::error::Error;
 use crate::newton::{AtSaddle, Certificate, Newton, Objective, ascend, climb};
 use crate::problem::Problem;
 use crate::system::System;
@@ -189,42 +189,16 @@ fn breakpoint_scale(system: &System, groups: &[usize]) -> f64 {
     groups
         .iter()
         .filter_map(|g| system.groups().get(*g))
-        .map(|g| system.model().sample_deviation(g.sensors()[0]))
+        .map(|g| system.model().sample_deviation(g.sensors[0]))
         .fold(f64::INFINITY, f64::min)
 }
 
-/// The greedy design (4.4): sensor by sensor in the given order, each for the criterion of the sensors up to it.
-///
-/// Returns one design per stage; stage `n` is a system of `n + 1` sensors. The first sensor's quantizer does not depend on the
-/// later sensors or on their noise.
+/// The stationary point over the breakpoints of the groups `active`, with all other groups fixed. No group is split.
 ///
 /// # Errors
-/// As [`joint`]; also if a group of `system` has more than one sensor, or `order` lists a group twice.
-pub fn greedy(system: &System, order: &[usize], criterion: Criterion, newton: &Newton) -> Result<Vec<Design>, Error> {
-    if order.is_empty() {
-        return refuse("order", "empty", "at least one group");
-    }
-    let mut stages: Vec<Design> = Vec::with_capacity(order.len());
-    for n in 0..order.len() {
-        let chain = &order[..=n];
-        let mut sensors = Vec::with_capacity(chain.len());
-        let (mut quantizers, mut channels) = (Vec::new(), Vec::new());
-        for (stage, g) in chain.iter().enumerate() {
-            let group = system.group(*g)?;
-            if group.sensors().len() != 1 {
-                return refuse("system", format!("{} sensors in group {g}", group.sensors().len()), "single sensors");
-            }
-            sensors.push(group.sensors()[0]);
-            // Earlier sensors keep their design; only the last one is optimised.
-            let designed = stages.last().and_then(|d| d.system.groups().get(stage));
-            quantizers.push(designed.unwrap_or(group).quantizer().clone());
-            channels.push(group.channel().clone());
-        }
-        let model = system.model().subset(&sensors)?;
-        let partial = System::distinct(model, quantizers, channels)?.with_outcome_limit(system.outcome_limit());
-        stages.push(optimise_until(&partial, &[n], criterion, newton, Deadline::NEVER)?.0);
-    }
-    Ok(stages)
+/// As [`joint`].
+pub fn of_groups(system: &System, active: &[usize], criterion: Criterion, newton: &Newton) -> Result<Design, Error> {
+    Ok(optimise_until(system, active, criterion, newton, Deadline::NEVER)?.0)
 }
 
 /// The best of the results of [`joint`] from the system's own quantizers and from `starts` random ones, with the same labels and channels.
@@ -274,15 +248,15 @@ fn random_system(system: &System, stream: Stream) -> Result<System, Error> {
         .groups()
         .iter()
         .map(|group| {
-            let spread = 1.3 * system.model().sample_deviation(group.sensors()[0]);
+            let spread = 1.3 * system.model().sample_deviation(group.sensors[0]);
             let mut b: Vec<f64> = group
-                .quantizer()
+                .quantizer
                 .breakpoints()
                 .iter()
                 .map(|_| mean + spread * normal::quantile(rng.random_range(0.02..0.98)))
                 .collect();
             b.sort_by(f64::total_cmp);
-            group.quantizer().with_breakpoints(b)
+            group.quantizer.with_breakpoints(b)
         })
         .collect::<Result<Vec<_>, _>>()?;
     system.with_quantizers(quantizers)

@@ -1,7 +1,7 @@
-//! Local design of all breakpoints by Newton's method, one sensor after the other or from several starts.
+//! Local design of breakpoints by Newton's method: of all groups or of some, also from several starts.
 
 mod apart;
 mod joint;
 
 pub(crate) use joint::joint_until;
-pub use joint::{Design, Scope, greedy, improved, joint, multi_start, random_starts};
+pub use joint::{Design, Scope, improved, joint, multi_start, of_groups, random_starts};

@@ -156,9 +156,9 @@ impl ObservationModel {
     /// A Gaussian prior and sensors with independent noise, all given by their standard deviations.
     ///
     /// # Errors
-    /// As [`Prior::gaussian_with_deviation`], [`Noise::independent_with_deviations`] and [`ObservationModel::new`].
+    /// As [`Prior::normal`], [`Noise::independent_with_deviations`] and [`ObservationModel::new`].
     pub fn gaussian_with_deviations(prior: f64, noise: &[f64]) -> Result<Self, Error> {
-        Self::new(Prior::gaussian_with_deviation(prior)?, Noise::independent_with_deviations(noise)?)
+        Self::new(Prior::normal(0.0, prior)?, Noise::independent_with_deviations(noise)?)
     }
 
     /// The prior.
@@ -328,7 +328,7 @@ mod tests {
 
     #[test]
     fn a_faint_correlation_takes_few_nodes() {
-        let prior = || Prior::gaussian_with_deviation(1.0).unwrap();
+        let prior = || Prior::normal(0.0, 1.0).unwrap();
         let none = ObservationModel::new(prior(), Noise::independent_with_deviations(&[1.0; 2]).unwrap()).unwrap();
         for rho in [1e-16, 1e-10, 1e-6, 1e-3] {
             let model =
@@ -358,7 +358,7 @@ mod tests {
             Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.85).unwrap(),
             Noise::equicorrelated_with_deviations(&[1.0, 0.5], -0.4).unwrap(),
         ] {
-            let model = ObservationModel::new(Prior::gaussian_with_deviation(2.0).unwrap(), noise).unwrap();
+            let model = ObservationModel::new(Prior::normal(0.0, 2.0).unwrap(), noise).unwrap();
             assert!((model.mass.weights.iter().sum::<f64>() - 1.0).abs() < 1e-14);
             assert!((model.variance - 4.0).abs() < 1e-12);
             assert!(model.moment.weights.iter().sum::<f64>().abs() < 1e-12);

@@ -146,14 +146,6 @@ impl Prior {
         Shape::Gaussian { mean, deviation }.try_into()
     }
 
-    /// Normal with mean 0 and the given standard deviation.
-    ///
-    /// # Errors
-    /// If `deviation` is not a positive number.
-    pub fn gaussian_with_deviation(deviation: f64) -> Result<Self, Error> {
-        Self::normal(0.0, deviation)
-    }
-
     /// Uniform on `[low, high]`.
     ///
     /// # Errors

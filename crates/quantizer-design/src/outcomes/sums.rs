@@ -1,7 +1,8 @@
 //! Sums over nodes of products of per-group tables. Most of the computing time is spent here.
 
-use super::table::{Feature, Table};
+use super::table::{Feature, Table, dot};
 use crate::deadline::Deadline;
+use std::borrow::Borrow;
 use std::ops::ControlFlow;
 
 /// Outcomes of smaller probability are left out of sums of quotients; their contribution to any error is below `1e-280`.
@@ -15,20 +16,6 @@ pub fn explained(mass: f64, moment: f64) -> f64 {
     } else {
         0.0
     }
-}
-
-/// Inner product with four independent sums, which the compiler vectorises.
-#[inline]
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in a4.zip(b4) {
-        for i in 0..4 {
-            sums[i] += x[i] * y[i];
-        }
-    }
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
 /// [`dot`] of `a` with four rows, with the same bits; `a` is read only once.
@@ -55,17 +42,22 @@ fn dot_with_four(a: &[f64], rows: [&[f64]; 4]) -> [f64; 4] {
 /// `sum_node feature(node) prod_g table_g[r_g](node)` for every combination of one row per table, and every feature.
 ///
 /// Layout of the result: the row of the first table varies slowest, the feature fastest. All tables have the same nodes.
-pub fn moments(tables: &[&Table], features: &[Feature]) -> Vec<f64> {
+pub fn moments(tables: &[impl Borrow<Table>], features: &[Feature]) -> Vec<f64> {
     moments_until(tables, features, Deadline::NEVER).unwrap_or_default()
 }
 
 /// As [`moments`]; `None` if the time limit is reached first.
-pub(crate) fn moments_until(tables: &[&Table], features: &[Feature], deadline: Deadline) -> Option<Vec<f64>> {
-    let combinations: usize = tables.iter().map(|t| t.rows()).product();
+pub(crate) fn moments_until(
+    tables: &[impl Borrow<Table>],
+    features: &[Feature],
+    deadline: Deadline,
+) -> Option<Vec<f64>> {
+    let combinations: usize = tables.iter().map(|t| t.borrow().rows()).product();
     let mut out = Vec::with_capacity(combinations * features.len());
     let Some((last, first)) = tables.split_last() else {
         return Some(out);
     };
+    let last = last.borrow();
     let mut weighted = vec![0.0; last.nodes];
     let walked = combined(first, &vec![1.0; last.nodes], |x, y| x * y, &mut |_, prefix| {
         if deadline.is_over() {
@@ -78,7 +70,7 @@ pub(crate) fn moments_until(tables: &[&Table], features: &[Feature], deadline: D
 }
 
 /// Visits every combination of one row per table: its index (the last table varies fastest), and `weights` times the product of the rows.
-pub fn for_each(tables: &[&Table], weights: &[f64], mut visit: impl FnMut(usize, &[f64])) {
+pub fn for_each(tables: &[impl Borrow<Table>], weights: &[f64], mut visit: impl FnMut(usize, &[f64])) {
     // Without a break the walk goes to its end.
     let _ = combined(tables, weights, |x, y| x * y, &mut |index, product| {
         visit(index, product);
@@ -87,7 +79,7 @@ pub fn for_each(tables: &[&Table], weights: &[f64], mut visit: impl FnMut(usize,
 }
 
 /// As [`for_each`], with the sum of `logs` and the rows: for tables of logarithms.
-pub fn for_each_log(tables: &[&Table], logs: &[f64], mut visit: impl FnMut(usize, &[f64])) {
+pub fn for_each_log(tables: &[impl Borrow<Table>], logs: &[f64], mut visit: impl FnMut(usize, &[f64])) {
     let _ = combined(tables, logs, |x, y| x + y, &mut |index, sum| {
         visit(index, sum);
         ControlFlow::Continue(())
@@ -96,7 +88,7 @@ pub fn for_each_log(tables: &[&Table], logs: &[f64], mut visit: impl FnMut(usize
 
 /// The rows of every combination joined node by node, until `visit` breaks. One row per table is kept.
 fn combined(
-    tables: &[&Table],
+    tables: &[impl Borrow<Table>],
     first: &[f64],
     join: impl Fn(f64, f64) -> f64 + Copy,
     visit: &mut impl FnMut(usize, &[f64]) -> ControlFlow<()>,
@@ -106,7 +98,7 @@ fn combined(
 }
 
 fn descend(
-    tables: &[&Table],
+    tables: &[impl Borrow<Table>],
     prefix: &[f64],
     join: impl Fn(f64, f64) -> f64 + Copy,
     levels: &mut [Vec<f64>],
@@ -116,6 +108,7 @@ fn descend(
     let (Some((table, tables)), Some((joined, levels))) = (tables.split_first(), levels.split_first_mut()) else {
         return visit(index, prefix);
     };
+    let table = table.borrow();
     for (r, row) in table.iter().enumerate() {
         for ((out, x), y) in joined.iter_mut().zip(prefix).zip(row) {
             *out = join(*x, *y);

@@ -5,15 +5,19 @@ use fewbits_numerics::kernels;
 /// Functions on the nodes, one per row.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Table {
-    pub(crate) values: Vec<f64>,
-    pub(crate) nodes: usize,
+    /// All values, row by row.
+    pub values: Vec<f64>,
+    /// Number of nodes.
+    pub nodes: usize,
 }
 
 /// Weights on a range of nodes: a linear functional of functions on the nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Feature {
-    pub(crate) start: usize,
-    pub(crate) weights: Vec<f64>,
+    /// The first node of the range.
+    pub start: usize,
+    /// The weights, from the first node of the range on.
+    pub weights: Vec<f64>,
 }
 
 impl Feature {
@@ -22,14 +26,9 @@ impl Feature {
         Self { start: 0, weights }
     }
 
-    /// The first node of the range.
-    pub fn start(&self) -> usize {
-        self.start
-    }
-
-    /// The weights, from the first node of the range on.
-    pub fn weights(&self) -> &[f64] {
-        &self.weights
+    /// The sum of a function on the nodes with these weights.
+    pub(crate) fn of(&self, function: &[f64]) -> f64 {
+        dot(&self.weights, &function[self.start..self.start + self.weights.len()])
     }
 }
 
@@ -42,16 +41,6 @@ impl Table {
     /// Number of rows; 0 without nodes.
     pub fn rows(&self) -> usize {
         self.values.len().checked_div(self.nodes).unwrap_or(0)
-    }
-
-    /// Number of nodes.
-    pub fn nodes(&self) -> usize {
-        self.nodes
-    }
-
-    /// All values, row by row.
-    pub fn values(&self) -> &[f64] {
-        &self.values
     }
 
     /// A row, of which there must be that many.
@@ -99,6 +88,20 @@ pub fn cell_probabilities(means: &[f64], deviation: f64, breakpoints: &[f64]) ->
         lower = upper;
     }
     Table::new(values, means.len())
+}
+
+/// Inner product with four independent sums, which the compiler vectorises.
+#[inline]
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
+    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in a4.zip(b4) {
+        for i in 0..4 {
+            sums[i] += x[i] * y[i];
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
 /// `to += factor * from`.

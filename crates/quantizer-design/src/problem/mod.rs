@@ -113,7 +113,7 @@ impl<'a> Problem<'a> {
     pub(crate) fn system_at(&self, b: &[f64]) -> Result<System, Error> {
         let mut groups = self.groups_at(b).into_iter();
         groups.try_fold(self.system.clone(), |system, (a, b)| {
-            system.with_quantizer(a.index, a.group.quantizer().with_breakpoints(b.to_vec())?)
+            system.with_quantizer(a.index, a.group.quantizer.with_breakpoints(b.to_vec())?)
         })
     }
 
@@ -148,7 +148,7 @@ impl<'a> Problem<'a> {
 
     fn entropy_share(&self, a: &Active<'_>, symbols: &Table) -> f64 {
         if self.scored.has_separable_entropy() {
-            a.group.sensors().len() as f64 * negative_entropy(symbols, &self.system.model().mass.weights)
+            a.group.sensors.len() as f64 * negative_entropy(symbols, &self.system.model().mass.weights)
         } else {
             0.0
         }

@@ -22,16 +22,16 @@ impl Problem<'_> {
         let mut offset = 0;
         for (a, b) in self.groups_at(b) {
             let symbols = a.symbols(b);
-            let (densities, slopes) = a.densities(b);
+            let densities = a.densities(b);
             value += self.entropy_share(a, &symbols);
             if self.scored.has_separable_entropy() {
-                let terms = self.entropy_derivatives(a, &symbols, &densities, &slopes);
+                let terms = self.entropy_derivatives(a, &symbols, &densities);
                 let mut own = gradient.rows_mut(offset, b.len());
                 own += terms.gradient;
                 let mut own = hessian.view_mut((offset, offset), (b.len(), b.len()));
                 own += terms.hessian;
             }
-            slots.push(a.slots(&symbols, &densities, &slopes));
+            slots.push(a.slots(&symbols, densities));
             offsets.push(offset);
             offset += b.len();
         }
@@ -135,12 +135,11 @@ impl Problem<'_> {
         &self,
         a: &Active<'_>,
         symbols: &Table,
-        densities: &[Vec<f64>],
-        slopes: &[Vec<f64>],
+        (densities, slopes): &(Table, Table),
     ) -> Derivatives {
         let mass = &self.system.model().mass.weights;
         let (n, nodes) = (a.parameters(), mass.len());
-        let sensors = a.group.sensors().len() as f64;
+        let sensors = a.group.sensors.len() as f64;
         let mut gradient = DVector::zeros(n);
         let mut hessian = DMatrix::zeros(n, n);
         let mut worth = vec![0.0; nodes];
@@ -155,10 +154,11 @@ impl Problem<'_> {
                     .for_each(|(w, p)| *w += c * p.max(LOG_FLOOR).ln());
             }
             for k in 0..nodes {
-                gradient[i] += sensors * mass[k] * densities[i][k] * worth[k];
-                hessian[(i, i)] += sensors * mass[k] * slopes[i][k] * worth[k];
+                gradient[i] += sensors * mass[k] * densities.row(i)[k] * worth[k];
+                hessian[(i, i)] += sensors * mass[k] * slopes.row(i)[k] * worth[k];
             }
             for j in i..n {
+                let (own, other) = (densities.row(i), densities.row(j));
                 let mut term = 0.0;
                 for (t, (c, d)) in a.exchange[i].iter().zip(&a.exchange[j]).enumerate() {
                     if c * d == 0.0 {
@@ -166,7 +166,7 @@ impl Problem<'_> {
                     }
                     for (k, p) in symbols.row(t).iter().copied().enumerate() {
                         if p > LOG_FLOOR {
-                            term += c * d * mass[k] * densities[i][k] * (densities[j][k] / p);
+                            term += c * d * mass[k] * own[k] * (other[k] / p);
                         }
                     }
                 }

@@ -48,7 +48,7 @@ impl Solution {
         let (system, model) = (self.system(), self.system().model());
         let mut tables: Vec<Table> = vec![Table::default(); model.sensors()];
         for (group, symbols) in system.groups().iter().zip(symbol_tables(system)?) {
-            group.sensors().iter().for_each(|n| tables[*n] = symbols.clone());
+            group.sensors.iter().for_each(|n| tables[*n] = symbols.clone());
         }
         let firsts: Vec<usize> = tables
             .iter()

@@ -2,7 +2,8 @@
 
 use super::adc::Rounded;
 use super::additive::AdditiveDecoder;
-use super::solution::{SensorDesign, Solution};
+use super::participant::SensorDesign;
+use super::solution::Solution;
 use crate::error::{Error, refuse};
 use fewbits_numerics::error::entries;
 use serde_json::json;

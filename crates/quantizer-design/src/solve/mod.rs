@@ -40,6 +40,7 @@ pub use adc::{Adc, Rounded};
 pub use additive::AdditiveDecoder;
 pub use control::{Progress, Stage, Watch};
 pub use export::{Export, JSON_SCHEMA};
+pub use participant::{SensorDesign, WordedCells};
 pub use request::{BitBudget, MAX_BITS, Request};
 pub use robust::{Minimax, Mismatch, Sensitivity, minimax};
-pub use solution::{Bound, BoundKind, SensorDesign, Solution, Solutions};
+pub use solution::{Bound, BoundKind, Solution, Solutions};

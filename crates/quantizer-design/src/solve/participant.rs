@@ -5,25 +5,50 @@ use crate::error::Error;
 use crate::observation_model::ObservationModel;
 use crate::system::{SensorGroup, System};
 use fewbits_core::Link;
+use fewbits_numerics::error::entries;
+use fewbits_quantizers::quantizer::{cell_of, check_increasing};
 use fewbits_quantizers::{Channel, Quantizer, lloyd_max};
+use serde::{Deserialize, Serialize};
 
-/// A sensor that takes part.
-#[derive(Debug, Clone)]
-pub(super) struct Participant {
-    /// Index of the sensor in the request's model.
-    pub(super) sensor: usize,
-    pub(super) bits: u32,
-    pub(super) link: Link,
+/// Cells and words of one sensor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorDesign {
+    /// Number of the sensor in the request.
+    pub sensor: usize,
+    /// Bits of a word.
+    pub bits: u32,
+    /// Breakpoints between the cells, increasing.
+    pub breakpoints: Vec<f64>,
+    /// Word of each cell, one more than breakpoints.
+    pub words: Vec<usize>,
+    /// The link over which the words are sent.
+    pub link: Link,
 }
 
-impl Participant {
-    /// The sensors with at least one bit.
+impl SensorDesign {
+    /// The word for a sample.
+    ///
+    /// # Errors
+    /// If the sample is NaN.
+    pub fn encode(&self, sample: f64) -> Result<usize, Error> {
+        Ok(self.words[cell_of(&self.breakpoints, sample)?])
+    }
+
+    /// Number of symbols that can be received: all words, and one more after them, "nothing", if a word may be missing.
+    pub fn symbols(&self) -> usize {
+        (1 << self.bits) + usize::from(missing(&self.link) > 0.0)
+    }
+
+    /// The sensors with at least one bit, of a single cell each.
     pub(super) fn all(bits: &[u32], links: &[Link]) -> Vec<Self> {
         let pairs = bits.iter().zip(links).enumerate().filter(|(_, (bits, _))| **bits > 0);
         pairs
             .map(|(sensor, (bits, link))| Self {
                 sensor,
                 bits: *bits,
+                breakpoints: Vec::new(),
+                words: vec![0],
                 link: *link,
             })
             .collect()
@@ -50,14 +75,22 @@ pub(super) fn missing(link: &Link) -> f64 {
     link.loss() + link.erasure()
 }
 
-/// Breakpoints of the cells of a sensor, and the word of each.
+/// The cells of a sensor with their words.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct WordedCells {
-    pub(super) breakpoints: Vec<f64>,
-    pub(super) words: Vec<usize>,
+pub struct WordedCells {
+    /// Breakpoints between the cells, increasing.
+    pub breakpoints: Vec<f64>,
+    /// Word of each cell, one more than breakpoints.
+    pub words: Vec<usize>,
 }
 
 impl WordedCells {
+    /// An error unless breakpoints increase and there is a word for each cell.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        check_increasing(&self.breakpoints)?;
+        Ok(entries("words", self.words.len(), self.breakpoints.len() + 1)?)
+    }
+
     /// The cells of a grid, with runs of equal words joined.
     pub(super) fn of(edges: &[f64], words: &[usize]) -> Self {
         let changes: Vec<usize> = (1..words.len()).filter(|c| words[*c] != words[c - 1]).collect();
@@ -88,10 +121,10 @@ impl WordedCells {
 /// Lloyd-Max cells of a normal sample, with a word for each level.
 pub(super) fn plain(
     model: &ObservationModel,
-    participants: &[Participant],
+    participants: &[SensorDesign],
     word: fn(usize) -> usize,
 ) -> Result<Vec<WordedCells>, Error> {
-    let of = |(n, participant): (usize, &Participant)| {
+    let of = |(n, participant): (usize, &SensorDesign)| {
         let levels = 1usize << participant.bits;
         let lloyd = lloyd_max::gaussian(levels)?.affine(model.sample_mean(), model.sample_deviation(n))?;
         Ok(WordedCells {
@@ -115,13 +148,13 @@ pub(super) fn natural(level: usize) -> usize {
 /// The system of these cells and words. Symbols are the received words, and one more if a word may be missing.
 pub(super) fn system_of(
     model: &ObservationModel,
-    participants: &[Participant],
+    participants: &[SensorDesign],
     cells: &[WordedCells],
     apart: bool,
 ) -> Result<System, Error> {
     let laws = participants
         .iter()
-        .map(Participant::law)
+        .map(SensorDesign::law)
         .collect::<Result<Vec<_>, _>>()?;
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for n in 0..participants.len() {
@@ -137,9 +170,13 @@ pub(super) fn system_of(
     }
     let groups = groups.into_iter().map(|sensors| {
         let (quantizer, channel) = parts_of(model, &laws[sensors[0]], &cells[sensors[0]])?;
-        SensorGroup::new(quantizer, channel, sensors)
+        Ok(SensorGroup {
+            quantizer,
+            channel,
+            sensors,
+        })
     });
-    System::new(model.clone(), groups.collect::<Result<_, _>>()?)
+    System::new(model.clone(), groups.collect::<Result<_, Error>>()?)
 }
 
 /// Quantizer and channel of one sensor. A sensor with a single cell gets a second cell with the same word.

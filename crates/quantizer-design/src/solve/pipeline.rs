@@ -1,7 +1,7 @@
 //! The steps from a request to its solutions: bits per sensor, search, Newton's method.
 
 use super::control::{Control, Stage};
-use super::participant::{Participant, WordedCells, gray, plain};
+use super::participant::{SensorDesign, WordedCells, gray, plain};
 use super::polish::polish;
 use super::request::{BitBudget, MAX_BITS, MAX_TOTAL, Request};
 use super::share;
@@ -33,6 +33,7 @@ impl Request<'_> {
     /// Bits of every sensor.
     fn checked_bits(&self, control: &mut Control<'_>) -> Result<Vec<u32>, Error> {
         let sensors = self.model.sensors();
+        entries("links", self.links.len(), sensors)?;
         let bits = match &self.bits {
             BitBudget::Each(bits) => vec![*bits; sensors],
             BitBudget::PerSensor(bits) => bits.clone(),
@@ -49,7 +50,11 @@ impl Request<'_> {
             return refuse("bits", bits, format!("at most {MAX_BITS} bits per sensor"));
         }
         // The words of a given start must fit the bits of their sensors.
+        if let Some(start) = &self.start {
+            entries("start", start.len(), sensors)?;
+        }
         for (bits, cells) in bits.iter().zip(self.start.iter().flatten()) {
+            cells.check()?;
             if let Some(word) = cells.words.iter().find(|w| **w >= 1 << bits) {
                 return refuse("word", word, format!("a word of {bits} bits"));
             }
@@ -61,7 +66,7 @@ impl Request<'_> {
     }
 
     fn solve(&self, bits: &[u32], control: &mut Control<'_>) -> Result<Vec<Solution>, Error> {
-        let participants = Participant::all(bits, &self.links);
+        let participants = SensorDesign::all(bits, &self.links);
         let sensors: Vec<usize> = participants.iter().map(|p| p.sensor).collect();
         let model = self.model.subset(&sensors)?;
         let given = self

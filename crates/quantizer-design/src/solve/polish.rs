@@ -1,6 +1,6 @@
 //! Newton's method on the full nodes for the breakpoints of a design found on grids; a cell that becomes empty is merged.
 
-use super::participant::{Participant, WordedCells, system_of};
+use super::participant::{SensorDesign, WordedCells, system_of};
 use super::solution::Solution;
 use crate::criterion::{Criterion, Scored};
 use crate::deadline::Deadline;
@@ -43,7 +43,7 @@ pub(super) fn evaluation_work(model: &ObservationModel, criterion: Criterion, ou
 pub(super) fn polish(
     model: &ObservationModel,
     criterion: Criterion,
-    participants: &[Participant],
+    participants: &[SensorDesign],
     mut cells: Vec<WordedCells>,
     apart: bool,
     deadline: Deadline,
@@ -81,8 +81,8 @@ pub(super) fn polish(
         match joint_until(&system, criterion, &newton, deadline) {
             Ok(design) if design.system.groups().len() == system.groups().len() => {
                 for (group, designed) in design.system.groups().iter().enumerate() {
-                    for n in system.groups()[group].sensors() {
-                        cells[*n].breakpoints = designed.quantizer().breakpoints().to_vec();
+                    for n in &system.groups()[group].sensors {
+                        cells[*n].breakpoints = designed.quantizer.breakpoints().to_vec();
                     }
                 }
                 if is_coarse {
@@ -94,7 +94,7 @@ pub(super) fn polish(
             }
             Err(Error::VanishingCell { quantizer, cell, .. }) => {
                 let mut merged = false;
-                for n in system.groups()[quantizer].sensors() {
+                for n in &system.groups()[quantizer].sensors {
                     merged |= merge(&mut cells[*n], cell);
                 }
                 if !merged {

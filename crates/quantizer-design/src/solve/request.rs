@@ -7,8 +7,6 @@ use crate::deadline::{Clock, system_clock};
 use crate::error::{Error, refuse};
 use crate::observation_model::ObservationModel;
 use fewbits_core::Link;
-use fewbits_numerics::error::entries;
-use fewbits_quantizers::quantizer::check_increasing;
 use std::time::Duration;
 
 /// Largest number of bits of a word. For longer words a Lloyd-Max quantizer is nearly optimal.
@@ -27,7 +25,20 @@ pub enum BitBudget {
     Total(u32),
 }
 
-/// A design problem: the model, the bits, the links and the criterion.
+/// A design problem: the model, the bits, the links and the criterion. A constructor sets all fields; others than its own are replaced:
+///
+/// ```
+/// use fewbits_core::Link;
+/// use fewbits_quantizer_design::{AllowedCells, BitBudget, Criterion, ObservationModel, Request};
+/// let model = ObservationModel::gaussian_with_deviations(1.0, &[0.3])?;
+/// let request = Request {
+///     criterion: Criterion::MutualInformation,
+///     cells: AllowedCells::Any,
+///     ..Request::estimation(model, BitBudget::Each(1), Link::PERFECT)
+/// };
+/// assert!(request.run()?.best().value > 0.4);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// ```
 /// use fewbits_core::Link;
@@ -44,21 +55,34 @@ pub enum BitBudget {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Request<'a> {
-    pub(super) model: ObservationModel,
-    pub(super) bits: BitBudget,
-    pub(super) links: Vec<Link>,
-    pub(super) criterion: Criterion,
-    pub(super) cells: AllowedCells,
-    pub(super) starts: usize,
-    /// Breakpoints and words of every sensor, as an additional start.
-    pub(super) start: Option<Vec<WordedCells>>,
-    pub(super) clock: Clock,
-    pub(super) time_limit: Option<Duration>,
-    pub(super) progress: Option<&'a mut Watch<'a>>,
+    /// Prior and noise.
+    pub model: ObservationModel,
+    /// Bits of the sensors.
+    pub bits: BitBudget,
+    /// The link of each sensor.
+    pub links: Vec<Link>,
+    /// The quantity that is optimised. The error probability needs a discrete prior.
+    pub criterion: Criterion,
+    /// Whether a word may stand for several intervals. Folded cells help if noise is shared or small; they are harder to interpret.
+    pub cells: AllowedCells,
+    /// Number of starts of the search over all sensors (default 60), at least two. Starts with one sensor's cells folded come in addition
+    /// if folded cells are allowed. Fewer are used if a start is expensive. The result is reproducible unless a time limit is reached.
+    pub starts: usize,
+    /// An additional start: a design for every sensor of the model.
+    pub start: Option<Vec<WordedCells>>,
+    /// The search ends after this time with the best design so far. Computing its value takes additional time: a fraction of a second, or
+    /// some seconds for a million joint symbols with correlated unequal noise.
+    pub time_limit: Option<Duration>,
+    /// The clock (default: [`system_clock`]). Another one is needed for a time limit and for
+    /// [`Progress::elapsed`](super::Progress::elapsed) where the standard library has no clock, as in a browser.
+    pub clock: Clock,
+    /// Called between steps of the search. If it breaks, the search ends with the best design so far, which is marked as cut short.
+    pub progress: Option<&'a mut Watch<'a>>,
 }
 
-impl<'a> Request<'a> {
-    /// Quantizers, words and decoder for the estimate of least mean squared error. The prior may also be discrete;
+impl Request<'_> {
+    /// Quantizers, words and decoder for the estimate of least mean squared error, with the same link for all sensors and one interval per
+    /// word. The prior may also be discrete;
     /// its values are then numbers to be estimated, not hypotheses.
     pub fn estimation(model: ObservationModel, bits: BitBudget, link: Link) -> Self {
         Self {
@@ -87,79 +111,5 @@ impl<'a> Request<'a> {
             criterion: Criterion::BayesError,
             ..Self::estimation(model, bits, link)
         })
-    }
-
-    /// Uses the mutual information between the unknown and the symbols as criterion.
-    #[must_use]
-    pub fn by_information(mut self) -> Self {
-        self.criterion = Criterion::MutualInformation;
-        self
-    }
-
-    /// Sets a link for each sensor.
-    ///
-    /// # Errors
-    /// If their number is not that of the sensors.
-    pub fn with_links(mut self, links: Vec<Link>) -> Result<Self, Error> {
-        entries("links", links.len(), self.model.sensors())?;
-        self.links = links;
-        Ok(self)
-    }
-
-    /// Sets whether a word may stand for several intervals (default: one interval per word). Folded cells help if noise is shared or
-    /// small; they are harder to interpret.
-    #[must_use]
-    pub fn with_cells(mut self, cells: AllowedCells) -> Self {
-        self.cells = cells;
-        self
-    }
-
-    /// Number of starts of the search over all sensors (default 60). Starts with one sensor's cells folded come in addition if folded cells
-    /// are allowed. Fewer are used if a start is expensive. The result is reproducible unless a time limit is reached.
-    #[must_use]
-    pub fn with_starts(mut self, starts: usize) -> Self {
-        self.starts = starts.max(1);
-        self
-    }
-
-    /// Adds a given design as a start: breakpoints, and the word of each cell, for every sensor of the model.
-    ///
-    /// # Errors
-    /// If there is not one entry per sensor, breakpoints do not increase, or there is not one word per cell.
-    pub fn with_start(mut self, cells: Vec<(Vec<f64>, Vec<usize>)>) -> Result<Self, Error> {
-        entries("cells", cells.len(), self.model.sensors())?;
-        for (breakpoints, words) in &cells {
-            check_increasing(breakpoints)?;
-            entries("cells", words.len(), breakpoints.len() + 1)?;
-        }
-        let cells = cells
-            .into_iter()
-            .map(|(breakpoints, words)| WordedCells { breakpoints, words });
-        self.start = Some(cells.collect());
-        Ok(self)
-    }
-
-    /// Ends the search after this time and returns the best design so far. Computing its value takes additional time: a fraction of a
-    /// second, or some seconds for a million joint symbols with correlated unequal noise.
-    #[must_use]
-    pub fn with_time_limit(mut self, limit: Duration) -> Self {
-        self.time_limit = Some(limit);
-        self
-    }
-
-    /// Reads times from this clock (default: [`system_clock`]). Needed for a time limit and for [`Progress::elapsed`](super::Progress::elapsed) where the standard
-    /// library has no clock, as in a browser.
-    #[must_use]
-    pub fn with_clock(mut self, clock: Clock) -> Self {
-        self.clock = clock;
-        self
-    }
-
-    /// Calls `progress` between steps of the search. If it breaks, the search ends with the best design so far, which is marked as cut
-    /// short.
-    #[must_use]
-    pub fn with_progress(mut self, progress: &'a mut Watch<'a>) -> Self {
-        self.progress = Some(progress);
-        self
     }
 }

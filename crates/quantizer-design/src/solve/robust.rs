@@ -2,15 +2,16 @@
 
 use super::control::Control;
 use super::landscape::{Grid, Landscape};
-use super::participant::{Participant, WordedCells};
+use super::participant::{SensorDesign, WordedCells};
 use super::request::Request;
 use super::search::{cells_of, climb, grid_with, refine, spacing};
-use super::solution::{SensorDesign, Solution};
+use super::solution::Solution;
 use crate::criterion::{AllowedCells, Criterion};
 use crate::deadline::system_clock;
 use crate::error::{Error, refuse};
-use crate::law::Reports;
+use crate::law::report_tables;
 use crate::observation_model::{ObservationModel, Resolution};
+use crate::outcomes::moments;
 use crate::system::System;
 use fewbits_numerics::error::{non_negative, within};
 
@@ -92,7 +93,7 @@ fn varied(model: &ObservationModel, offset: f64, prior: f64, noise: f64) -> Resu
 /// Probability and moment about the prior mean of every joint symbol; the first sensor varies slowest.
 fn outcome_moments(system: &System) -> Result<Vec<f64>, Error> {
     let model = system.model();
-    Ok(Reports::of(system)?.moments(&[model.mass.clone(), model.moment.clone()]))
+    Ok(moments(&report_tables(system)?, &[model.mass.clone(), model.moment.clone()]))
 }
 
 /// Mean squared error of a table of estimates: `E (X - m)^2 + sum_t (P_t d_t^2 + 2 d_t M_t)` with `d_t = m - estimate_t`.
@@ -164,10 +165,10 @@ pub fn minimax(
         .into_iter()
         .map(|[mean, deviation, noise]| varied(&centre, mean, 1.0 + deviation, 1.0 + noise))
         .collect::<Result<Vec<_>, _>>()?;
-    let participants = nominal.participants();
-    let laws = participants
+    let laws = nominal
+        .sensors()
         .iter()
-        .map(Participant::law)
+        .map(SensorDesign::law)
         .collect::<Result<Vec<_>, _>>()?;
     let mut weights = vec![1.0 / models.len() as f64; models.len()];
     let weighted: Vec<(f64, &ObservationModel)> = weights.iter().copied().zip(&models).collect();

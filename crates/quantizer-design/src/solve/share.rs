@@ -12,7 +12,7 @@
 //! with the largest signal-to-noise ratio, which is halved for each bit that a sensor has.
 
 use super::control::Control;
-use super::participant::Participant;
+use super::participant::SensorDesign;
 use super::request::{MAX_BITS, Request};
 use super::starts::Search;
 use crate::criterion::AllowedCells;
@@ -111,7 +111,7 @@ impl Tried<'_, '_> {
     }
 
     fn value_of(&self, bits: &[u32], control: &mut Control<'_>) -> Result<f64, Error> {
-        let participants = Participant::all(bits, &self.request.links);
+        let participants = SensorDesign::all(bits, &self.request.links);
         let sensors: Vec<usize> = participants.iter().map(|p| p.sensor).collect();
         let search = Search {
             model: &self.request.model.subset(&sensors)?,

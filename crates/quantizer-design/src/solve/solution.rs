@@ -1,6 +1,6 @@
 //! A finished design: cells and words of every sensor, the value of the criterion, a bound and a certificate.
 
-use super::participant::{Participant, WordedCells, missing, system_of};
+use super::participant::{SensorDesign, WordedCells, missing, system_of};
 use super::request::MAX_BITS;
 use crate::bounds;
 use crate::criterion::Criterion;
@@ -12,7 +12,6 @@ use crate::observation_model::ObservationModel;
 use crate::system::System;
 use fewbits_core::Link;
 use fewbits_numerics::error::entries;
-use fewbits_quantizers::quantizer::cell_of;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
@@ -32,37 +31,6 @@ impl Solutions {
     pub fn best(&self) -> &Solution {
         // A successful request has at least one design.
         &self.all[0]
-    }
-}
-
-/// Cells and words of one sensor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SensorDesign {
-    /// Number of the sensor in the request.
-    pub sensor: usize,
-    /// Bits of a word.
-    pub bits: u32,
-    /// Breakpoints between the cells, increasing.
-    pub breakpoints: Vec<f64>,
-    /// Word of each cell, one more than breakpoints.
-    pub words: Vec<usize>,
-    /// The link over which the words are sent.
-    pub link: Link,
-}
-
-impl SensorDesign {
-    /// The word for a sample.
-    ///
-    /// # Errors
-    /// If the sample is NaN.
-    pub fn encode(&self, sample: f64) -> Result<usize, Error> {
-        Ok(self.words[cell_of(&self.breakpoints, sample)?])
-    }
-
-    /// Number of symbols that can be received: all words, and one more after them, "nothing", if a word may be missing.
-    pub fn symbols(&self) -> usize {
-        (1 << self.bits) + usize::from(missing(&self.link) > 0.0)
     }
 }
 
@@ -156,18 +124,16 @@ impl TryFrom<Stored> for Solution {
 impl Solution {
     pub(super) fn new(
         criterion: Criterion,
-        participants: &[Participant],
+        participants: &[SensorDesign],
         system: System,
         cells: Vec<WordedCells>,
         certificate: Certificate,
         scope: Scope,
     ) -> Result<Self, Error> {
         let sensors = participants.iter().zip(cells).map(|(p, cells)| SensorDesign {
-            sensor: p.sensor,
-            bits: p.bits,
             breakpoints: cells.breakpoints,
             words: cells.words,
-            link: p.link,
+            ..p.clone()
         });
         let sensors: Vec<SensorDesign> = sensors.collect();
         Ok(Self {
@@ -228,18 +194,6 @@ impl Solution {
             .collect()
     }
 
-    /// The words of each sensor for many samples: a column per sensor, in the order of [`Solution::sensors`].
-    ///
-    /// # Errors
-    /// If there is not one column per sensor, or a sample is NaN.
-    pub fn encode_columns(&self, samples: &[&[f64]]) -> Result<Vec<Vec<usize>>, Error> {
-        entries("samples", samples.len(), self.sensors.len())?;
-        let columns = self.sensors.iter().zip(samples);
-        columns
-            .map(|(sensor, column)| column.iter().map(|y| sensor.encode(*y)).collect())
-            .collect()
-    }
-
     /// The decoder of least squared error, a table of at most `limit` entries.
     ///
     /// # Errors
@@ -249,23 +203,10 @@ impl Solution {
     }
 
     pub(super) fn with_cells(&self, cells: Vec<WordedCells>) -> Result<Self, Error> {
-        for cells in &cells {
-            fewbits_quantizers::quantizer::check_increasing(&cells.breakpoints)?;
-            entries("breakpoints", cells.breakpoints.len(), cells.words.len() - 1)?;
-        }
-        let participants = self.participants();
+        cells.iter().try_for_each(WordedCells::check)?;
         let apart = self.system.groups().len() == self.sensors.len();
-        let system = system_of(self.system.model(), &participants, &cells, apart)?;
-        Self::new(self.criterion, &participants, system, cells, Certificate::Unproved, self.scope)
-    }
-
-    pub(super) fn participants(&self) -> Vec<Participant> {
-        let parts = self.sensors.iter().map(|s| Participant {
-            sensor: s.sensor,
-            bits: s.bits,
-            link: s.link,
-        });
-        parts.collect()
+        let system = system_of(self.system.model(), &self.sensors, &cells, apart)?;
+        Self::new(self.criterion, &self.sensors, system, cells, Certificate::Unproved, self.scope)
     }
 
     /// The system of these cells and words under another model of as many sensors.
@@ -274,7 +215,7 @@ impl Solution {
             let expected = format!("{}, those that take part", self.sensors.len());
             return refuse("model", format!("{} sensors", model.sensors()), expected);
         }
-        system_of(model, &self.participants(), &self.cells(), true)
+        system_of(model, &self.sensors, &self.cells(), true)
     }
 
     /// Cells and words of every sensor.

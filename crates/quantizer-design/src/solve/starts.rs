@@ -2,7 +2,7 @@
 
 use super::control::{Control, Stage};
 use super::landscape::{Grid, Landscape, Words};
-use super::participant::{Participant, WordedCells, gray, natural, plain, system_of};
+use super::participant::{SensorDesign, WordedCells, gray, natural, plain, system_of};
 use super::polish;
 use super::search::{Point, best_of, cells_of, climb, gray_walk, grid_with, random_start, refine, spacing, start};
 use crate::criterion::{AllowedCells, Criterion};
@@ -50,7 +50,7 @@ pub(super) struct Searched {
 pub(super) struct Search<'a> {
     pub(super) model: &'a ObservationModel,
     pub(super) criterion: Criterion,
-    pub(super) participants: &'a [Participant],
+    pub(super) participants: &'a [SensorDesign],
     pub(super) shape: AllowedCells,
     /// Number of starts of all sensors together.
     pub(super) starts: usize,
@@ -63,7 +63,7 @@ impl Search<'_> {
         let (model, participants) = (self.model, self.participants);
         let laws = participants
             .iter()
-            .map(Participant::law)
+            .map(SensorDesign::law)
             .collect::<Result<Vec<_>, _>>()?;
         let singles = self.single_sensors(&laws, control)?;
         let mut first = singles.iter().map(|s| s[0].clone()).collect::<Vec<_>>();
@@ -325,7 +325,7 @@ fn stream(sensor: usize, i: usize) -> Stream {
 /// whose levels repeat cyclically or back and forth. Most of these cannot be reached from intervals by improving steps.
 fn folded_starts(
     landscape: &Landscape,
-    participants: &[Participant],
+    participants: &[SensorDesign],
     singles: &[Vec<WordedCells>],
 ) -> Vec<Vec<WordedCells>> {
     let mut starts = Vec::new();

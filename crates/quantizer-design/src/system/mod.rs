@@ -7,7 +7,7 @@ pub use group::SensorGroup;
 use crate::error::{Error, refuse};
 use crate::observation_model::ObservationModel;
 use crate::outcomes::counts::count;
-use fewbits_numerics::error::entries;
+use fewbits_numerics::error::{at_least_one, entries};
 use fewbits_quantizers::Channel;
 use fewbits_quantizers::Quantizer;
 use fewbits_quantizers::lloyd_max;
@@ -54,10 +54,16 @@ impl System {
     /// A system of groups.
     ///
     /// # Errors
-    /// If some sensor of the model is not in exactly one group, or the sensors of a group differ in noise.
+    /// If some sensor of the model is not in exactly one group, a group has no sensor, its sensors differ in noise, or its channel's number
+    /// of inputs is not its quantizer's number of levels.
     pub fn new(model: ObservationModel, groups: Vec<SensorGroup>) -> Result<Self, Error> {
         let mut seen = vec![false; model.sensors()];
         for group in &groups {
+            let (inputs, levels) = (group.channel.inputs(), group.quantizer.levels());
+            if inputs != levels {
+                return refuse("channel", format!("{inputs} inputs"), format!("one input a level, {levels}"));
+            }
+            at_least_one("sensors", group.sensors.len())?;
             for n in &group.sensors {
                 match seen.get_mut(*n) {
                     None => return refuse("sensor", n, format!("a number below {}", model.sensors())),
@@ -93,10 +99,12 @@ impl System {
             return refuse("quantizers", given, format!("{} of each", model.sensors()));
         }
         let pairs = quantizers.into_iter().zip(channels).enumerate();
-        let groups = pairs
-            .map(|(n, (q, c))| SensorGroup::new(q, c, vec![n]))
-            .collect::<Result<_, _>>()?;
-        Self::new(model, groups)
+        let groups = pairs.map(|(n, (quantizer, channel))| SensorGroup {
+            quantizer,
+            channel,
+            sensors: vec![n],
+        });
+        Self::new(model, groups.collect())
     }
 
     /// A system with a quantizer for each sensor and ideal channels.
@@ -118,7 +126,12 @@ impl System {
     pub fn identical(model: ObservationModel, quantizer: Quantizer) -> Result<Self, Error> {
         let sensors = (0..model.sensors()).collect();
         let channel = Channel::ideal(quantizer.levels())?;
-        Self::new(model, vec![SensorGroup::new(quantizer, channel, sensors)?])
+        let group = SensorGroup {
+            quantizer,
+            channel,
+            sensors,
+        };
+        Self::new(model, vec![group])
     }
 
     /// A system in which each sensor has the Lloyd-Max quantizer of its own sample and an ideal channel: the usual start of a design.
@@ -142,13 +155,15 @@ impl System {
             let kept: Vec<usize> = (0..sensors.len())
                 .filter(|n| g.sensors.contains(&sensors[*n]))
                 .collect();
-            (!kept.is_empty()).then(|| SensorGroup::new(g.quantizer.clone(), g.channel.clone(), kept))
+            (!kept.is_empty()).then(|| SensorGroup {
+                sensors: kept,
+                ..g.clone()
+            })
         });
         if let Some(n) = (1..sensors.len()).find(|n| sensors[..*n].contains(&sensors[*n])) {
             return refuse("sensor", format!("{} twice", sensors[n]), "each sensor once");
         }
-        let system = Self::new(self.model.subset(sensors)?, groups.collect::<Result<_, _>>()?)?;
-        Ok(system.with_outcome_limit(self.outcome_limit))
+        Ok(Self::new(self.model.subset(sensors)?, groups.collect())?.with_outcome_limit(self.outcome_limit))
     }
 
     /// Allows at most `limit` joint outcomes in any computation (default `2^20`).
@@ -178,7 +193,7 @@ impl System {
     }
 
     /// Largest number of joint outcomes that a computation may enumerate.
-    pub(crate) fn outcome_limit(&self) -> u64 {
+    pub fn outcome_limit(&self) -> u64 {
         self.outcome_limit
     }
 
@@ -197,10 +212,10 @@ impl System {
     /// # Errors
     /// If there is no such group or the quantizer has another number of levels than the channel takes.
     pub fn with_quantizer(&self, group: usize, quantizer: Quantizer) -> Result<Self, Error> {
-        let mut system = self.clone();
-        let old = self.group(group)?;
-        system.groups[group] = SensorGroup::new(quantizer, old.channel.clone(), old.sensors.clone())?;
-        Ok(system)
+        self.group(group)?;
+        let mut groups = self.groups.clone();
+        groups[group].quantizer = quantizer;
+        self.with_groups(groups)
     }
 
     /// The same system with another quantizer in each group.
@@ -209,10 +224,9 @@ impl System {
     /// As [`System::with_quantizer`], or if the number of quantizers is not the number of groups.
     pub fn with_quantizers(&self, quantizers: Vec<Quantizer>) -> Result<Self, Error> {
         entries("quantizers", quantizers.len(), self.groups.len())?;
-        quantizers
-            .into_iter()
-            .enumerate()
-            .try_fold(self.clone(), |system, (g, q)| system.with_quantizer(g, q))
+        let mut groups = self.groups.clone();
+        groups.iter_mut().zip(quantizers).for_each(|(g, q)| g.quantizer = q);
+        self.with_groups(groups)
     }
 
     /// The same quantizers with other channels.
@@ -221,10 +235,14 @@ impl System {
     /// If a channel does not fit its quantizer or their number differs from the groups'.
     pub fn with_channels(&self, channels: Vec<Channel>) -> Result<Self, Error> {
         entries("channels", channels.len(), self.groups.len())?;
-        let groups = self.groups.iter().zip(channels);
-        let groups = groups.map(|(g, c)| SensorGroup::new(g.quantizer.clone(), c, g.sensors.clone()));
-        let rebuilt = Self::new(self.model.clone(), groups.collect::<Result<_, _>>()?)?;
-        Ok(rebuilt.with_outcome_limit(self.outcome_limit))
+        let mut groups = self.groups.clone();
+        groups.iter_mut().zip(channels).for_each(|(g, c)| g.channel = c);
+        self.with_groups(groups)
+    }
+
+    /// The same sensors in other groups.
+    pub(crate) fn with_groups(&self, groups: Vec<SensorGroup>) -> Result<Self, Error> {
+        Ok(Self::new(self.model.clone(), groups)?.with_outcome_limit(self.outcome_limit))
     }
 
     pub(crate) fn group(&self, group: usize) -> Result<&SensorGroup, Error> {

@@ -79,15 +79,13 @@ fn useless_link() -> Export {
     let noise = Noise::independent_with_deviations(&[1.0, 1.0]).unwrap();
     let model = ObservationModel::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
     let links = vec![Link::flipping(0.5).unwrap(), Link::PERFECT];
-    let request = Request::estimation(model, BitBudget::Each(1), Link::PERFECT).with_links(links);
+    let request = Request {
+        links,
+        starts: 2,
+        ..Request::estimation(model, BitBudget::Each(1), Link::PERFECT)
+    };
     let adc = Adc::new(12, 0.0..=40.0).unwrap();
-    let rounded = request
-        .unwrap()
-        .with_starts(2)
-        .run()
-        .unwrap()
-        .best()
-        .rounded(&[adc, adc]);
+    let rounded = request.run().unwrap().best().rounded(&[adc, adc]);
     rounded.unwrap().export("plant", 4096).unwrap()
 }
 
@@ -108,15 +106,12 @@ fn a_sensor_with_one_word_makes_a_valid_header() {
 fn the_rust_constants_are_the_design() {
     let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
     let model = ObservationModel::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
-    let request = Request::estimation(model, BitBudget::PerSensor(vec![2, 1]), Link::new(0.05, 0.02).unwrap());
+    let request = Request {
+        starts: 2,
+        ..Request::estimation(model, BitBudget::PerSensor(vec![2, 1]), Link::new(0.05, 0.02).unwrap())
+    };
     let adc = Adc::new(12, 0.0..=40.0).unwrap();
-    let rounded = request
-        .with_starts(2)
-        .run()
-        .unwrap()
-        .best()
-        .rounded(&[adc, adc])
-        .unwrap();
+    let rounded = request.run().unwrap().best().rounded(&[adc, adc]).unwrap();
     let numbers = |values: &[f64]| values.iter().map(|v| v.to_bits().to_string()).collect::<Vec<_>>();
     let mut expected: Vec<Vec<String>> = Vec::new();
     for (sensor, thresholds) in rounded.solution.sensors().iter().zip(&rounded.thresholds) {
@@ -175,7 +170,10 @@ fn the_c_header_decodes_as_the_library() {
     let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
     let model = ObservationModel::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
     let link = Link::new(0.05, 0.02).unwrap();
-    let request = Request::estimation(model, BitBudget::PerSensor(vec![3, 2]), link).with_starts(3);
+    let request = Request {
+        starts: 3,
+        ..Request::estimation(model, BitBudget::PerSensor(vec![3, 2]), link)
+    };
     let adc = Adc::new(12, 0.0..=40.0).unwrap();
     let rounded = request.run().unwrap().best().rounded(&[adc, adc]).unwrap();
     let mut rng = Stream::new(9).named("words").rng();

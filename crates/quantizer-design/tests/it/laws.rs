@@ -34,7 +34,7 @@ fn pair() -> impl Strategy<Value = System> {
             let sds = if equal { [s1, s1] } else { [s1, s2] };
             let rho = if rho.abs() < 0.2 { 0.0 } else { rho };
             let model = ObservationModel::new(
-                Prior::gaussian_with_deviation(1.0).unwrap(),
+                Prior::normal(0.0, 1.0).unwrap(),
                 Noise::equicorrelated_with_deviations(&sds, rho).unwrap(),
             )
             .unwrap();
@@ -54,7 +54,7 @@ fn grouped() -> impl Strategy<Value = System> {
         let prior = if kind == 2 {
             Prior::discrete(vec![-1.0, 0.2, 1.5], vec![0.3, 0.5, 0.2]).unwrap()
         } else {
-            Prior::gaussian_with_deviation(1.0).unwrap()
+            Prior::normal(0.0, 1.0).unwrap()
         };
         let noise = if kind == 1 {
             Noise::equicorrelated_with_deviations(&[sd; 4], 0.3)
@@ -62,10 +62,17 @@ fn grouped() -> impl Strategy<Value = System> {
             Noise::independent_with_deviations(&[sd, sd, sd, 0.8])
         };
         let model = ObservationModel::new(prior, noise.unwrap()).unwrap();
-        let three =
-            SensorGroup::new(Quantizer::new(a).unwrap(), Channel::symbol_erasure(3, loss).unwrap(), vec![0, 1, 2]);
-        let one = SensorGroup::new(Quantizer::new(b).unwrap(), Channel::ideal(2).unwrap(), vec![3]);
-        System::new(model, vec![three.unwrap(), one.unwrap()]).unwrap()
+        let three = SensorGroup {
+            quantizer: Quantizer::new(a).unwrap(),
+            channel: Channel::symbol_erasure(3, loss).unwrap(),
+            sensors: vec![0, 1, 2],
+        };
+        let one = SensorGroup {
+            quantizer: Quantizer::new(b).unwrap(),
+            channel: Channel::ideal(2).unwrap(),
+            sensors: vec![3],
+        };
+        System::new(model, vec![three, one]).unwrap()
     })
 }
 
@@ -143,7 +150,7 @@ proptest! {
     fn mirrors_and_swaps_change_nothing(system in pair()) {
         let mirror = system.quantizers().iter().map(Quantizer::mirrored).collect();
         let mirrored_words = Labelling::new(vec![3, 2, 1, 0]).unwrap();
-        let [a, b] = [0, 1].map(|g| system.groups()[g].channel().clone());
+        let [a, b] = [0, 1].map(|g| system.groups()[g].channel.clone());
         // Natural words in reverse order are their complements: the same binary channel.
         prop_assert!((mirrored_words.word(0), mirrored_words.word(3)) == (Some(3), Some(0)));
         let mirrored = system.with_quantizers(mirror).unwrap();
@@ -166,9 +173,8 @@ proptest! {
             system
                 .groups()
                 .iter()
-                .flat_map(|g| g.sensors().iter().map(move |n| SensorGroup::new(g.quantizer().clone(), g.channel().clone(), vec![*n])))
-                .collect::<Result<_, _>>()
-                .unwrap(),
+                .flat_map(|g| g.sensors.iter().map(move |n| SensorGroup { sensors: vec![*n], ..g.clone() }))
+                .collect(),
         ).unwrap();
         for criterion in [MI, MSE] {
             prop_assert!((system.value(criterion).unwrap() - apart.value(criterion).unwrap()).abs() < 1e-12);
@@ -204,10 +210,13 @@ proptest! {
     fn derivatives_of_bayes_errors_agree_with_differences(b in breakpoints(3), theta in 0.5..3.0f64, prior in 0.2..0.8f64) {
         let noise = Noise::independent_with_deviations(&[1.0, 1.0, 0.7]).unwrap();
         let model = ObservationModel::new(Prior::binary(theta, prior).unwrap(), noise).unwrap();
-        let q = Quantizer::new(b).unwrap();
-        let ideal = Channel::ideal(4).unwrap();
-        let pair = SensorGroup::new(q.clone(), ideal.clone(), vec![0, 1]).unwrap();
-        let system = System::new(model, vec![pair, SensorGroup::new(q, ideal, vec![2]).unwrap()]).unwrap();
+        let one = SensorGroup {
+            quantizer: Quantizer::new(b).unwrap(),
+            channel: Channel::ideal(4).unwrap(),
+            sensors: vec![2],
+        };
+        let pair = SensorGroup { sensors: vec![0, 1], ..one.clone() };
+        let system = System::new(model, vec![pair, one]).unwrap();
         let decisions = |s: &System| {
             let table = JointTable::new(s).unwrap();
             (0..table.outcomes()).map(|t| table.decide(t)).collect::<Vec<_>>()
@@ -221,7 +230,7 @@ proptest! {
 
     #[test]
     fn the_dynamic_programme_equals_brute_force(sd in 0.3..1.5f64, rho in -0.8..0.8f64, kind in 0..3usize) {
-        let prior = if kind == 2 { Prior::binary(1.5, 0.4) } else { Prior::gaussian_with_deviation(1.0) }.unwrap();
+        let prior = if kind == 2 { Prior::binary(1.5, 0.4) } else { Prior::normal(0.0, 1.0) }.unwrap();
         let model = ObservationModel::new(prior, Noise::equicorrelated_with_deviations(&[sd, sd], rho).unwrap()).unwrap();
         let q = |b: [f64; 2]| Quantizer::new(b.to_vec()).unwrap();
         let system = System::ideal(model, vec![q([-0.7, 0.9]), q([-0.5, 0.4])]).unwrap();
@@ -268,7 +277,7 @@ fn empty_far_and_useless_cells_are_finite() {
     let near = Quantizer::new(vec![-1e-9, 1e-9]).unwrap();
     for rho in [0.0, 0.6] {
         let model = ObservationModel::new(
-            Prior::gaussian_with_deviation(1.0).unwrap(),
+            Prior::normal(0.0, 1.0).unwrap(),
             Noise::equicorrelated_with_deviations(&[1.0; 2], rho).unwrap(),
         )
         .unwrap();
@@ -313,7 +322,7 @@ fn small_equivocations_keep_their_digits() {
 #[test]
 fn a_step_off_leaves_the_saddle_of_two_signs() {
     let model = ObservationModel::new(
-        Prior::gaussian_with_deviation(1.0).unwrap(),
+        Prior::normal(0.0, 1.0).unwrap(),
         Noise::equicorrelated_with_deviations(&[1.0; 2], 0.85).unwrap(),
     )
     .unwrap();
@@ -360,7 +369,7 @@ fn impossible_requests_are_named() {
             .to_string()
             .contains("single sensor")
     );
-    assert!(design::greedy(&counted, &[0], MI, &Newton::default()).is_err());
+    assert!(baselines::greedy(&counted, &[0], MI, &Newton::default()).is_err());
     assert!(baselines::alternating_step(&counted, 0, MI).is_err());
     let many = System::ideal(ObservationModel::gaussian_with_deviations(1.0, &[1.0; 11]).unwrap(), vec![q.clone(); 11])
         .unwrap();

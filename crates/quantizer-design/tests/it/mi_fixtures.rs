@@ -2,7 +2,6 @@
 
 use fewbits_baselines::quantizer_design::{self as baselines, Separation};
 use fewbits_quantizer_design::design::{self, Design};
-use fewbits_quantizer_design::system::SensorGroup;
 use fewbits_quantizer_design::table::JointTable;
 use fewbits_quantizer_design::{
     Channel, Criterion, Labelling, Newton, Noise, ObservationModel, Prior, Quantizer, System, bounds, canonical,
@@ -163,7 +162,7 @@ fn lloyd_max_of_the_normal(entry: &Entry) {
 
 fn remote(entry: &Entry) {
     let i = |k| number(&entry.inputs[k]);
-    let prior = Prior::gaussian_with_deviation(i("sx2").sqrt()).unwrap();
+    let prior = Prior::normal(0.0, i("sx2").sqrt()).unwrap();
     let noise = Noise::independent_with_variances(&[i("s2")]).unwrap();
     close(
         entry,
@@ -182,7 +181,7 @@ fn ceo(entry: &Entry) {
         }
         None => (numbers(s2), numbers(rate)),
     };
-    let prior = Prior::gaussian_with_deviation(number(&entry.inputs["sx2"]).sqrt()).unwrap();
+    let prior = Prior::normal(0.0, number(&entry.inputs["sx2"]).sqrt()).unwrap();
     let noise = Noise::independent_with_variances(&s2).unwrap();
     close(entry, "D", bounds::ceo(&prior, &noise, &rate).unwrap().distortion, number(&entry.value));
 }
@@ -223,11 +222,8 @@ fn model(entry: &Entry) -> ObservationModel {
         _ => vec![1.0, 1.0],
     };
     let rho = i.get("rho").map_or(0.0, number);
-    ObservationModel::new(
-        Prior::gaussian_with_deviation(1.0).unwrap(),
-        Noise::equicorrelated_with_deviations(&sds, rho).unwrap(),
-    )
-    .unwrap()
+    ObservationModel::new(Prior::normal(0.0, 1.0).unwrap(), Noise::equicorrelated_with_deviations(&sds, rho).unwrap())
+        .unwrap()
 }
 
 fn check_values(entry: &Entry, expected: &Value, system: &System) {
@@ -295,7 +291,7 @@ fn pair(entry: &Entry) {
     let sample = lloyd_of(&|n| model.sample_deviation(n));
     let criterion = criterion(id);
     let last = |order: &[usize]| {
-        design::greedy(&sample, order, criterion, &plain)
+        baselines::greedy(&sample, order, criterion, &plain)
             .unwrap()
             .pop()
             .unwrap()
@@ -344,7 +340,7 @@ fn nine_sensors(entry: &Entry) {
     if entry.id.contains("greedy") {
         let start = System::ideal(model, vec![lloyd(4, 1.4); n]).unwrap();
         let order: Vec<usize> = (0..n - 1).collect();
-        let stages = design::greedy(&start, &order, criterion, &Newton::default()).unwrap();
+        let stages = baselines::greedy(&start, &order, criterion, &Newton::default()).unwrap();
         let rows = rows(&entry.value);
         let mut quantizers = Vec::new();
         for (design, row) in stages.iter().zip(&rows) {
@@ -414,7 +410,7 @@ fn detection(entry: &Entry) {
     }
     if kind == "MIgreedy" {
         let start = System::ideal(model(5), vec![about(1.0); 5]).unwrap();
-        let design = design::greedy(&start, &[0, 1, 2, 3, 4], MI, &newton)
+        let design = baselines::greedy(&start, &[0, 1, 2, 3, 4], MI, &newton)
             .unwrap()
             .pop()
             .unwrap();
@@ -494,7 +490,7 @@ fn pair_over_bsc(entry: &Entry) {
     let start = over(&bsc(labels, number(&entry.inputs["eps"])), &start);
     let criterion = criterion(&entry.id);
     let design = if entry.id.contains("greedy") {
-        design::greedy(&start, &[0, 1], criterion, &Newton::default())
+        baselines::greedy(&start, &[0, 1], criterion, &Newton::default())
             .unwrap()
             .pop()
             .unwrap()
@@ -547,19 +543,14 @@ fn alternating_series(entry: &Entry) {
         let stage = row[1] as usize;
         if row[2] > 0.0 {
             let quantizer = if stage == 1 {
-                let first = both.groups()[0].clone();
-                let alone = both.model().subset(&[0]).unwrap();
-                let group = SensorGroup::new(first.quantizer().clone(), first.channel().clone(), vec![0]).unwrap();
-                baselines::alternating_step(&System::new(alone, vec![group]).unwrap(), 0, MI).unwrap()
+                baselines::alternating_step(&both.subset(&[0]).unwrap(), 0, MI).unwrap()
             } else {
                 baselines::alternating_step(&both, 1, MI).unwrap()
             };
             both = both.with_quantizer(stage - 1, quantizer).unwrap();
         }
-        let first = &both.groups()[0];
-        let group = SensorGroup::new(first.quantizer().clone(), first.channel().clone(), vec![0]).unwrap();
-        let alone = System::new(both.model().subset(&[0]).unwrap(), vec![group]).unwrap();
-        let outer = |g: usize| both.groups()[g].quantizer().breakpoints()[2];
+        let alone = both.subset(&[0]).unwrap();
+        let outer = |g: usize| both.groups()[g].quantizer.breakpoints()[2];
         let values = [
             alone.value(MI).unwrap(),
             both.value(MI).unwrap(),
@@ -600,7 +591,7 @@ fn alternating_step(entry: &Entry) {
 fn bifurcation(entry: &Entry) {
     let signs = |sd: f64, rho: f64| {
         let noise = Noise::equicorrelated_with_deviations(&[sd, sd], rho)?;
-        let model = ObservationModel::new(Prior::gaussian_with_deviation(1.0)?, noise)?;
+        let model = ObservationModel::new(Prior::normal(0.0, 1.0)?, noise)?;
         System::ideal(model, vec![Quantizer::new(vec![0.0])?; 2])
     };
     let criterion = criterion(&entry.id);
@@ -640,7 +631,7 @@ fn modulo_or_monte_carlo(entry: &Entry) {
         // The simulated value must agree with quadrature within its own interval.
         let model = |rho| {
             ObservationModel::new(
-                Prior::gaussian_with_deviation(1.0).unwrap(),
+                Prior::normal(0.0, 1.0).unwrap(),
                 Noise::equicorrelated_with_deviations(&[1.0; 2], rho).unwrap(),
             )
             .unwrap()

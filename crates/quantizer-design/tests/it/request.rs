@@ -3,9 +3,9 @@
 use super::models;
 use fewbits_core::Link;
 use fewbits_monte_carlo::Stream;
-use fewbits_quantizer_design::AllowedCells;
 use fewbits_quantizer_design::design::Scope;
 use fewbits_quantizer_design::solve::{Adc, BitBudget, Progress, Request, Solution, minimax};
+use fewbits_quantizer_design::{AllowedCells, Criterion, WordedCells};
 use fewbits_quantizer_design::{Certificate, Noise, ObservationModel, Prior};
 use rand::RngExt;
 use std::ops::ControlFlow;
@@ -23,12 +23,11 @@ fn unit_pair(rho: f64) -> ObservationModel {
 }
 
 fn best(model: ObservationModel, bits: BitBudget, link: Link) -> Solution {
-    Request::estimation(model, bits, link)
-        .with_starts(8)
-        .run()
-        .unwrap()
-        .best()
-        .clone()
+    let request = Request {
+        starts: 8,
+        ..Request::estimation(model, bits, link)
+    };
+    request.run().unwrap().best().clone()
 }
 
 /// Squared error of encoder, link and decoder on simulated samples, with its standard error.
@@ -94,8 +93,11 @@ fn two_correlated_sensors_over_a_flipping_link() {
 fn two_correlated_sensors_with_folded_cells() {
     let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
     let model = ObservationModel::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
-    let request = Request::estimation(model, BitBudget::Each(3), Link::flipping(0.02).unwrap());
-    let solutions = request.with_cells(AllowedCells::Any).run().unwrap();
+    let request = Request {
+        cells: AllowedCells::Any,
+        ..Request::estimation(model, BitBudget::Each(3), Link::flipping(0.02).unwrap())
+    };
+    let solutions = request.run().unwrap();
     assert!(solutions.best().value < 1.354_45, "{}", solutions.best().value);
     assert_eq!(solutions.best().certificate, Certificate::LocalOptimum);
     assert!(solutions.steps < 1000, "{} steps", solutions.steps);
@@ -107,8 +109,12 @@ fn folded_cells_of_one_bit_are_found() {
     let folded = |scale: f64| {
         let noise = Noise::equicorrelated_with_deviations(&[scale; 2], 0.85).unwrap();
         let model = ObservationModel::new(Prior::normal(0.0, scale).unwrap(), noise).unwrap();
-        let request = Request::estimation(model, BitBudget::Each(1), Link::PERFECT).with_cells(AllowedCells::Any);
-        request.with_starts(1).run().unwrap().best().clone()
+        let request = Request {
+            cells: AllowedCells::Any,
+            starts: 1,
+            ..Request::estimation(model, BitBudget::Each(1), Link::PERFECT)
+        };
+        request.run().unwrap().best().clone()
     };
     let one = folded(1.0);
     assert!((one.value - 0.559_245_993_323_162_8).abs() < 1e-11, "{}", one.value);
@@ -122,9 +128,11 @@ fn folded_cells_of_one_bit_are_found() {
 #[test]
 fn folded_cells_beat_intervals_where_noise_is_small() {
     let intervals = best(pair(1.0), BitBudget::Each(2), Link::PERFECT);
-    let folded = Request::estimation(pair(1.0), BitBudget::Each(2), Link::PERFECT)
-        .with_cells(AllowedCells::Any)
-        .with_starts(8);
+    let folded = Request {
+        cells: AllowedCells::Any,
+        starts: 8,
+        ..Request::estimation(pair(1.0), BitBudget::Each(2), Link::PERFECT)
+    };
     let folded = folded.run().unwrap().best().clone();
     assert!(folded.value < 0.95 * intervals.value, "{} {}", folded.value, intervals.value);
 }
@@ -146,10 +154,11 @@ fn printed_optima_are_found() {
         let found = best(unit_pair(rho), BitBudget::Each(2), Link::PERFECT).value;
         assert!((found - value).abs() < 1e-7, "{rho}: {found}");
     }
-    let informed = Request::estimation(unit_pair(0.85), BitBudget::Each(2), Link::PERFECT)
-        .by_information()
-        .run()
-        .unwrap();
+    let informed = Request {
+        criterion: Criterion::MutualInformation,
+        ..Request::estimation(unit_pair(0.85), BitBudget::Each(2), Link::PERFECT)
+    };
+    let informed = informed.run().unwrap();
     assert!((informed.best().value - 0.331_123_01).abs() < 1e-7);
 }
 
@@ -157,11 +166,9 @@ fn printed_optima_are_found() {
 fn detection_reaches_the_printed_error_probability() {
     let noise = Noise::independent_with_deviations(&[1.0; 5]).unwrap();
     let model = ObservationModel::new(Prior::binary(2.0, 0.5).unwrap(), noise).unwrap();
-    let found = Request::detection(model, BitBudget::Each(2), Link::PERFECT)
-        .unwrap()
-        .with_starts(2)
-        .run()
-        .unwrap();
+    let mut request = Request::detection(model, BitBudget::Each(2), Link::PERFECT).unwrap();
+    request.starts = 2;
+    let found = request.run().unwrap();
     assert!(found.best().value < 1.660_803_1e-2, "{}", found.best().value);
     assert!(Request::detection(unit_pair(0.0), BitBudget::Each(2), Link::PERFECT).is_err());
 }
@@ -254,9 +261,11 @@ fn a_time_limit_still_gives_a_design() {
         calls += 1;
         ControlFlow::Continue(())
     };
-    let request = Request::estimation(pair(1.0), BitBudget::Each(3), Link::PERFECT)
-        .with_time_limit(Duration::ZERO)
-        .with_progress(&mut count);
+    let request = Request {
+        time_limit: Some(Duration::ZERO),
+        progress: Some(&mut count),
+        ..Request::estimation(pair(1.0), BitBudget::Each(3), Link::PERFECT)
+    };
     let found = request.run().unwrap();
     assert!(found.is_cut_short && found.best().value < 16.0);
     assert!(calls > 0);
@@ -278,8 +287,11 @@ fn a_search_that_is_stopped_gives_its_best_so_far() {
                 ControlFlow::Continue(())
             }
         };
-        let request = Request::estimation(pair(1.0), BitBudget::Each(3), Link::PERFECT);
-        let found = request.with_progress(&mut stop).run().unwrap();
+        let request = Request {
+            progress: Some(&mut stop),
+            ..Request::estimation(pair(1.0), BitBudget::Each(3), Link::PERFECT)
+        };
+        let found = request.run().unwrap();
         let value = found.best().value;
         assert_eq!((found.is_cut_short, calls), (last < usize::MAX, last.min(calls)), "{last}");
         assert!(value >= whole * (1.0 - 1e-12) && value < alone, "{last}: {value}, {whole}, {alone}");
@@ -300,10 +312,19 @@ fn times_are_read_from_the_clock_that_is_handed_in() {
         elapsed.push(progress.elapsed);
         ControlFlow::Continue(())
     };
-    let request = || Request::estimation(pair(1.0), BitBudget::Each(2), Link::PERFECT).with_clock(clock);
-    let limited = request().with_time_limit(Duration::from_secs(7)).run().unwrap();
+    let limited = Request {
+        clock,
+        time_limit: Some(Duration::from_secs(7)),
+        ..Request::estimation(pair(1.0), BitBudget::Each(2), Link::PERFECT)
+    };
+    let limited = limited.run().unwrap();
     assert!(limited.is_cut_short);
-    let found = request().with_progress(&mut keep).run().unwrap();
+    let found = Request {
+        clock,
+        progress: Some(&mut keep),
+        ..Request::estimation(pair(1.0), BitBudget::Each(2), Link::PERFECT)
+    };
+    let found = found.run().unwrap();
     assert!(!found.is_cut_short && found.best().value <= limited.best().value);
     assert!(
         !elapsed.is_empty()
@@ -327,9 +348,13 @@ fn large_designs_end_soon_after_their_time_limit() {
     let model = ObservationModel::new(Prior::normal(0.0, 1.0).unwrap(), noise).unwrap();
     let alone = best(model.subset(&[0]).unwrap(), BitBudget::Each(4), Link::flipping(0.05).unwrap()).value;
     for bits in [BitBudget::Each(4), BitBudget::Total(18)] {
-        let request = Request::estimation(model.clone(), bits.clone(), Link::flipping(0.05).unwrap()).with_clock(clock);
+        let request = Request {
+            clock,
+            time_limit: Some(Duration::from_millis(500)),
+            ..Request::estimation(model.clone(), bits.clone(), Link::flipping(0.05).unwrap())
+        };
         let start = clock();
-        let found = request.with_time_limit(Duration::from_millis(500)).run().unwrap();
+        let found = request.run().unwrap();
         let elapsed = clock() - start;
         assert!(elapsed < Duration::from_millis(700), "{bits:?}: {elapsed:?}");
         assert!(found.is_cut_short);
@@ -417,7 +442,10 @@ fn sensitivity_is_zero_without_a_change() {
 
 #[test]
 fn minimax_lowers_the_worst_case() {
-    let request = Request::estimation(unit_pair(0.0), BitBudget::Each(2), Link::PERFECT).with_starts(4);
+    let request = Request {
+        starts: 4,
+        ..Request::estimation(unit_pair(0.0), BitBudget::Each(2), Link::PERFECT)
+    };
     let found = minimax(request, 0.5, 0.3, 0.3).unwrap();
     assert!(found.worst_case < found.nominal_worst_case, "{found:?}");
     assert!(found.bound <= found.worst_case && found.bound > 0.9 * found.worst_case, "{found:?}");
@@ -456,15 +484,28 @@ fn a_prior_by_a_function_that_may_fail() {
 }
 
 #[test]
-fn columns_are_encoded_as_rows() {
-    let solution = best(unit_pair(0.3), BitBudget::PerSensor(vec![2, 1]), Link::PERFECT);
-    let columns = [[-1.3, 0.2, 2.0], [0.4, -0.9, 0.0]];
-    let words = solution
-        .encode_columns(&columns.each_ref().map(|column| &column[..]))
-        .unwrap();
-    for row in 0..3 {
-        let expected = solution.encode(&[columns[0][row], columns[1][row]]).unwrap();
-        assert_eq!([words[0][row], words[1][row]], expected[..]);
+fn requests_that_do_not_fit_are_refused() {
+    let cells = |breakpoints: &[f64], words: &[usize]| WordedCells {
+        breakpoints: breakpoints.to_vec(),
+        words: words.to_vec(),
+    };
+    let request = || Request::estimation(unit_pair(0.3), BitBudget::Each(1), Link::PERFECT);
+    let one = Request {
+        links: vec![Link::PERFECT],
+        ..request()
+    };
+    assert!(one.run().unwrap_err().to_string().contains("links"));
+    for (other, what) in [
+        (vec![cells(&[0.0], &[0, 1])], "start"),
+        (vec![cells(&[0.0], &[0, 1]), cells(&[0.0], &[0])], "words"),
+        (vec![cells(&[0.0], &[0, 1]), cells(&[1.0, 0.0], &[0, 1, 0])], "increas"),
+        (vec![cells(&[0.0], &[0, 1]), cells(&[0.0], &[0, 2])], "word"),
+    ] {
+        let request = Request {
+            start: Some(other),
+            ..request()
+        };
+        let error = request.run().unwrap_err().to_string();
+        assert!(error.contains(what), "{error}");
     }
-    assert!(solution.encode_columns(&[&[0.0]]).is_err());
 }

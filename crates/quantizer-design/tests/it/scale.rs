@@ -15,12 +15,12 @@ const SCALES: [f64; 2] = [1e-4, 1e4];
 
 fn pair(rho: f64, scale: f64) -> ObservationModel {
     let noise = Noise::equicorrelated_with_deviations(&[scale, 0.8 * scale], rho).unwrap();
-    ObservationModel::new(Prior::gaussian_with_deviation(scale).unwrap(), noise).unwrap()
+    ObservationModel::new(Prior::normal(0.0, scale).unwrap(), noise).unwrap()
 }
 
 fn equal_pair(rho: f64, scale: f64) -> ObservationModel {
     let noise = Noise::equicorrelated_with_deviations(&[scale; 2], rho).unwrap();
-    ObservationModel::new(Prior::gaussian_with_deviation(scale).unwrap(), noise).unwrap()
+    ObservationModel::new(Prior::normal(0.0, scale).unwrap(), noise).unwrap()
 }
 
 fn size(criterion: Criterion, scale: f64) -> f64 {
@@ -55,7 +55,7 @@ fn joint_and_greedy_designs_know_no_unit() {
             let start = |scale: f64| System::lloyd_max(pair(rho, scale), 4).unwrap();
             law(criterion, 1e-8, |s| design::joint(&start(s), criterion, &newton).unwrap());
             law(criterion, 1e-8, |s| {
-                design::greedy(&start(s), &[1, 0], criterion, &newton)
+                baselines::greedy(&start(s), &[1, 0], criterion, &newton)
                     .unwrap()
                     .pop()
                     .unwrap()
@@ -96,8 +96,12 @@ fn searches_know_no_unit() {
         Design { iterations: 0, ..best }
     });
     let folded = |s: f64| {
-        let request = Request::estimation(equal_pair(0.85, s), BitBudget::Each(1), Link::PERFECT);
-        let found = request.with_cells(AllowedCells::Any).with_starts(6).run().unwrap();
+        let request = Request {
+            cells: AllowedCells::Any,
+            starts: 6,
+            ..Request::estimation(equal_pair(0.85, s), BitBudget::Each(1), Link::PERFECT)
+        };
+        let found = request.run().unwrap();
         found.best().value / (s * s)
     };
     let one = folded(1.0);
@@ -267,9 +271,8 @@ fn nodes_of_a_density_are_estimated_not_guessed() {
         found.best().clone()
     });
     assert!((estimated.value / exact.value - 1.0).abs() < 1e-3, "{} {}", estimated.value, exact.value);
-    let request = Request::detection(nodes, BitBudget::Each(1), Link::PERFECT)
-        .unwrap()
-        .with_starts(4);
+    let mut request = Request::detection(nodes, BitBudget::Each(1), Link::PERFECT).unwrap();
+    request.starts = 4;
     let guessed = request.run().unwrap().best().clone();
     assert!(estimated.value < guessed.mean_squared_error().unwrap());
     assert!(guessed.value < estimated.system().value(Criterion::BayesError).unwrap());

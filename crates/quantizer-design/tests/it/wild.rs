@@ -16,7 +16,7 @@ fn wild() -> impl Strategy<Value = f64> {
 fn priors(x: &[f64; 8]) -> impl Iterator<Item = Prior> {
     [
         Prior::normal(x[0], x[1]),
-        Prior::gaussian_with_deviation(x[1]),
+        Prior::normal(0.0, x[1]),
         Prior::uniform(x[0], x[1]),
         Prior::binary(x[0], x[1]),
         Prior::discrete(vec![x[0], x[1]], vec![x[2], x[3]]),

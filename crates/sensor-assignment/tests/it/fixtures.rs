@@ -1,9 +1,8 @@
 //! Every entry of the fixture file, computed by independent programs, against the library.
 
 use crate::entry::{Entry, check};
-use fewbits_sensor_assignment::{
-    CodedSensors, Estimator, all_errors, bit_error, by_precision, flipped_estimate, pair_costs, quantization_error,
-};
+use fewbits_baselines::sensor_assignment::{all_errors, bit_error, by_precision, flipped_estimate};
+use fewbits_sensor_assignment::{CodedSensors, Estimator, pair_costs, quantization_error};
 use serde_json::Value;
 
 fn entries() -> Vec<Entry> {

@@ -1,7 +1,8 @@
 //! Laws of assignments on random sensors.
 
+use fewbits_baselines::sensor_assignment::{all_errors, variances_with_moments};
 use fewbits_binary_patterns::bounds::optimal_weight_van_trees;
-use fewbits_sensor_assignment::{CodedSensors, Estimator, all_errors, exchange, pair_costs, variances_with_moments};
+use fewbits_sensor_assignment::{CodedSensors, Estimator, exchange, pair_costs};
 use proptest::prelude::*;
 
 fn variances() -> impl Strategy<Value = Vec<f64>> {

@@ -1,10 +1,9 @@
 //! Wild arguments: assignments, costs and errors are numbers or refused.
 
+use fewbits_baselines::sensor_assignment::{by_precision, flipped_estimate, variances_with_moments};
 use fewbits_core::Observation;
 use fewbits_numerics::wild;
-use fewbits_sensor_assignment::{
-    CodedSensors, CostMatrix, Estimator, by_precision, flipped_estimate, pair_costs, variances_with_moments,
-};
+use fewbits_sensor_assignment::{CodedSensors, CostMatrix, Estimator, pair_costs};
 use proptest::prelude::*;
 
 fn wild() -> impl Strategy<Value = f64> {

@@ -1,8 +1,8 @@
 //! The search space of an exhaustive search.
 
-use crate::patterns::count::{full_rank_multisets, multisets};
 use crate::patterns::linear::{check_mask, grid_bits, sensors_of};
-use crate::{Bank, CellGrid, Error, Mask, Source};
+use crate::{Bank, CellGrid, Error, Mask, PatternSensor, Source};
+use fewbits_numerics::binomial;
 use fewbits_numerics::error::{at_least_one, positive};
 
 /// A set of masks, one per sensor, in increasing order, with its error.
@@ -78,16 +78,17 @@ impl LinearSearch {
         Ok(self)
     }
 
-    /// Number of sets, without regard to required masks.
+    /// Number of sets of any rank, without regard to required masks: an upper bound of those that are searched.
+    pub(crate) fn sets(&self) -> u64 {
+        binomial::saturating((1 << self.bits) - 2 + self.sensors, self.sensors)
+    }
+
+    /// The sensors of a set of masks.
     ///
     /// # Errors
-    /// If full rank is required of fewer sensors than bits, or the number exceeds 128 bits.
-    pub(crate) fn sets(&self) -> Result<u128, Error> {
-        if self.full_rank {
-            full_rank_multisets(self.bits, self.sensors)
-        } else {
-            multisets((1 << self.bits) - 1, self.sensors as u128)
-        }
+    /// If a mask is out of range.
+    pub fn sensors(&self, masks: &[Mask]) -> Result<Vec<PatternSensor>, Error> {
+        sensors_of(masks, &self.grid, self.noise_deviation)
     }
 
     /// The bank of a set of masks with this source, grid and noise.
@@ -95,6 +96,6 @@ impl LinearSearch {
     /// # Errors
     /// If a mask is out of range or there is no mask.
     pub fn bank(&self, masks: &[Mask]) -> Result<Bank, Error> {
-        Bank::new(self.source, sensors_of(masks, &self.grid, self.noise_deviation)?)
+        Bank::new(self.source, self.sensors(masks)?)
     }
 }

@@ -32,13 +32,13 @@ impl LookUp<Symbol> {
         let groups = system.groups();
         let sensor = |sensor: usize| -> Result<QuantizingSensor, Error> {
             let missing = || ArgumentError::new("system", "a sensor without quantizer", "a quantizer for every sensor");
-            let mut group = groups.iter().filter(|group| group.sensors().contains(&sensor));
-            let quantizer = group.next().ok_or_else(missing)?.quantizer();
+            let mut group = groups.iter().filter(|group| group.sensors.contains(&sensor));
+            let quantizer = &group.next().ok_or_else(missing)?.quantizer;
             let levels = quantizer.levels();
             let labelling = Labelling::gray(levels).or_else(|_| Labelling::natural(levels))?;
             Ok(QuantizingSensor::with_variance(quantizer.clone(), labelling, 1.0)?)
         };
-        let count = groups.iter().map(|group| group.sensors().len()).sum();
+        let count = groups.iter().map(|group| group.sensors.len()).sum();
         let sensors = (0..count).map(sensor).collect::<Result<Vec<_>, _>>()?;
         let decoder = MmseDecoder::new(system, limit)?;
         let prior = decoder.decode(&vec![Observation::Lost; count])?;

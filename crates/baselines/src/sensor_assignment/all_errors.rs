@@ -1,25 +1,15 @@
-//! Errors of all assignments for small `N`, and local search for larger `N`.
+//! Exact errors of all assignments of a few sensors.
 
-use super::CodedSensors;
-use super::coded::{Moments, explained_by_pair};
-use crate::Error;
 use fewbits_numerics::error::refuse;
 use fewbits_quantizer_design::outcomes::Table;
+use fewbits_sensor_assignment::engine::{Moments, explained_by_pair};
+use fewbits_sensor_assignment::{CodedSensors, Error, Estimator};
 use nalgebra::DMatrix;
 
 /// Largest number of sensors for enumeration; 10! is 3.6 million.
 const MAX_ENUMERATED: usize = 10;
-/// Smallest relative improvement for which two sensors are exchanged.
-const IMPROVEMENT: f64 = 1e-12;
-
-/// The estimator whose exact error is computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Estimator {
-    /// The decoder that returns the centre of the cell.
-    CellCentre,
-    /// The posterior mean.
-    PosteriorMean,
-}
+/// Errors that differ by less than this fraction are equal.
+const TIE: f64 = 1e-12;
 
 /// Errors of all assignments.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,64 +22,6 @@ pub struct AllErrors {
     pub mean: f64,
     /// Largest error.
     pub largest: f64,
-}
-
-/// The result of [`exchange`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct Exchanged {
-    /// An assignment that no exchange of two sensors improves.
-    pub assignment: Vec<usize>,
-    /// Exact error of the assignment.
-    pub error: f64,
-    /// Number of errors evaluated.
-    pub evaluations: usize,
-}
-
-impl CodedSensors {
-    /// Exact error of an assignment under `estimator`.
-    ///
-    /// # Errors
-    /// If the assignment is not a permutation.
-    pub fn mse(&self, assignment: &[usize], estimator: Estimator) -> Result<f64, Error> {
-        match estimator {
-            Estimator::CellCentre => self.centre_mse(assignment),
-            Estimator::PosteriorMean => self.mmse(assignment),
-        }
-    }
-}
-
-/// Exchanges pairs of sensors as long as the exact error decreases, the best exchange first.
-///
-/// # Errors
-/// If the start is not a permutation.
-pub fn exchange(sensors: &CodedSensors, start: &[usize], estimator: Estimator) -> Result<Exchanged, Error> {
-    let mut assignment = start.to_vec();
-    let mut error = sensors.mse(&assignment, estimator)?;
-    let mut evaluations = 1;
-    loop {
-        // Steepest descent: the best of all exchanges is made, as long as it improves the error by more than rounding.
-        let mut best = (error * (1.0 - IMPROVEMENT), None);
-        for i in 0..assignment.len() {
-            for j in i + 1..assignment.len() {
-                assignment.swap(i, j);
-                let trial = sensors.mse(&assignment, estimator)?;
-                evaluations += 1;
-                assignment.swap(i, j);
-                if trial < best.0 {
-                    best = (trial, Some((i, j)));
-                }
-            }
-        }
-        let Some((i, j)) = best.1 else {
-            return Ok(Exchanged {
-                assignment,
-                error,
-                evaluations,
-            });
-        };
-        assignment.swap(i, j);
-        error = best.0;
-    }
 }
 
 /// Exact errors of all `N!` assignments.
@@ -135,8 +67,8 @@ struct Tally {
 impl Tally {
     fn add(&mut self, assignment: &[usize], error: f64) {
         let all = &mut self.errors;
-        let better = error < all.least * (1.0 - IMPROVEMENT);
-        let tied = error <= all.least * (1.0 + IMPROVEMENT) && assignment < all.best.as_slice();
+        let better = error < all.least * (1.0 - TIE);
+        let tied = error <= all.least * (1.0 + TIE) && assignment < all.best.as_slice();
         if better || tied {
             all.best = assignment.to_vec();
             all.least = if tied { all.least.min(error) } else { error };
@@ -186,10 +118,8 @@ impl Half {
                 .clone()
                 .zip(&order)
                 .map(|(bit, &sensor)| &sensors.probability[bit][sensor]);
-            values.extend_from_slice(
-                own.fold(Table::new(vec![1.0; nodes], nodes), |all, own| all.outer(own))
-                    .values(),
-            );
+            let ones = Table::new(vec![1.0; nodes], nodes);
+            values.extend(own.fold(ones, |all, own| all.outer(own)).values);
             orders.push(order);
         });
         let columns = DMatrix::from_vec(nodes, values.len() / nodes, values);
@@ -211,7 +141,7 @@ fn mmse_halves(sensors: &CodedSensors, tally: &mut Tally) {
         // Probabilities and first moments of all joint outcomes: a row for each of the first half, a column for the second.
         let [mass, moment] = features.each_ref().map(|feature| {
             let mut weighted = first.columns.clone();
-            for (mut row, w) in weighted.row_iter_mut().zip(feature.weights()) {
+            for (mut row, w) in weighted.row_iter_mut().zip(&feature.weights) {
                 row *= *w;
             }
             weighted.transpose() * &second.columns
@@ -233,7 +163,7 @@ fn mmse_halves(sensors: &CodedSensors, tally: &mut Tally) {
 }
 
 /// Visits all permutations of `0..n` in lexicographic order.
-pub(super) fn for_permutations(n: usize, mut visit: impl FnMut(&[usize])) {
+fn for_permutations(n: usize, mut visit: impl FnMut(&[usize])) {
     let mut p: Vec<usize> = (0..n).collect();
     loop {
         visit(&p);
@@ -282,12 +212,8 @@ mod tests {
     }
 
     #[test]
-    fn exchange_ends_at_or_below_its_start() {
-        let sensors = CodedSensors::with_variances(1.0, &[0.004, 0.01, 0.02, 0.03, 0.05]).unwrap();
-        let found = exchange(&sensors, &[4, 3, 2, 1, 0], Estimator::PosteriorMean).unwrap();
-        let least = all_errors(&sensors, Estimator::PosteriorMean).unwrap().least;
-        assert_relative_eq!(found.error, least, max_relative = 1e-9);
-        assert!(exchange(&sensors, &[0, 0, 1, 2, 3], Estimator::CellCentre).is_err());
-        assert!(all_errors(&CodedSensors::with_variances(1.0, &[0.01; 11]).unwrap(), Estimator::CellCentre).is_err());
+    fn eleven_sensors_are_too_many() {
+        let sensors = CodedSensors::with_variances(1.0, &[0.01; 11]).unwrap();
+        assert!(all_errors(&sensors, Estimator::CellCentre).is_err());
     }
 }

@@ -1,6 +1,6 @@
-//! Noise variances for tests, and an assignment without optimisation.
+//! Random networks of the figures of chapter 6, and an assignment without optimisation.
 
-use crate::Error;
+use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, non_negative, positive, refuse};
 
 /// Variances with exactly this mean and population standard deviation; their deviations from the mean are proportional to the centred
@@ -17,7 +17,7 @@ pub fn variances_with_moments(
     deviation: f64,
     least: f64,
     direction: &[f64],
-) -> Result<Option<Vec<f64>>, Error> {
+) -> Result<Option<Vec<f64>>, ArgumentError> {
     let mean = positive("mean", mean)?;
     let deviation = non_negative("deviation", deviation)?;
     let least = positive("least", least)?;
@@ -71,7 +71,7 @@ mod tests {
     fn infeasible_moments_are_typed_errors() {
         assert!(matches!(
             variances_with_moments(0.03, 0.06, 1e-4, &[1.0, 2.0, 3.0, 4.0]),
-            Err(Error::Argument(e)) if e.name == "deviation"
+            Err(e) if e.name == "deviation"
         ));
         assert!(variances_with_moments(0.03, 0.01, 1e-4, &[1.0; 4]).is_err());
         assert!(variances_with_moments(-0.03, 0.01, 1e-4, &[1.0, 2.0]).is_err());
