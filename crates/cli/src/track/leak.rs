@@ -14,6 +14,8 @@ use serde::Serialize;
 
 /// The probability with which the written area holds the leak.
 const AREA: f64 = 0.9;
+/// From so many reports on, zeros and ones are told to be bits.
+const BITS: u64 = 6;
 /// Below this misfit rooms are not to be trusted.
 const MISFIT: f64 = 1e-3;
 
@@ -30,6 +32,8 @@ struct Summary {
     misfit: f64,
     /// Sensors without a reading.
     silent: Vec<String>,
+    /// What the readings suggest that the file of rooms does not say.
+    hints: Vec<String>,
 }
 
 /// What the belief says after a row.
@@ -133,6 +137,8 @@ pub(super) fn run(options: &LeakOptions) -> Result<Ending, Error> {
     let mut sheet = Sheet::new(options.output.as_deref(), Shape::of(options.json), names)?;
     let refused = Error::refused("the belief is refused");
     let (mut heard, count) = (vec![0_u64; known.len()], rows.len());
+    // How often each sensor reported 0 and 1.
+    let mut bits = vec![[0_u64; 2]; known.len()];
     for (number, row) in rows.into_iter().enumerate() {
         for ((column, cell), qualifier) in row.reports.iter().zip(&row.qualifiers) {
             let (Some(cell), sensor) = (cell, places[*column]) else {
@@ -149,6 +155,9 @@ pub(super) fn run(options: &LeakOptions) -> Result<Ending, Error> {
             let observed = belief.observe(sensor, row.seconds, &reading, deviation);
             observed.map_err(|fault| failed(Box::new(fault)))?;
             heard[sensor] += 1;
+            if *cell == 0.0 || *cell == 1.0 {
+                bits[sensor][usize::from(*cell == 1.0)] += 1;
+            }
         }
         if !options.last || number + 1 == count {
             let found = estimate(&belief, &plan, &transport).map_err(&refused)?;
@@ -158,12 +167,23 @@ pub(super) fn run(options: &LeakOptions) -> Result<Ending, Error> {
     }
     sheet.finish()?;
     let found = estimate(&belief, &plan, &transport).map_err(&refused)?;
+    let is_bits = |sensor: &usize| {
+        let [zeros, ones] = bits[*sensor];
+        rooms.sends_values(*sensor) && zeros.min(ones) > 0 && zeros + ones == heard[*sensor] && heard[*sensor] >= BITS
+    };
+    let hint = |sensor: usize| {
+        let name = known[sensor];
+        format!(
+            "{name} reports 0 and 1 only: if it says whether a threshold is reached, state its `thresholds`; without them the rooms are wrong"
+        )
+    };
     let silent = known.iter().zip(&heard).filter(|(_, readings)| **readings == 0);
     let summary = Summary {
         rows: count as u64,
         readings: heard.iter().sum(),
         copies: instants.copies,
         silent: silent.map(|(name, _)| (*name).to_owned()).collect(),
+        hints: (0..known.len()).filter(is_bits).map(hint).collect(),
         area: found.area,
         misfit: found.misfit,
         rooms: found.rooms.clone(),
@@ -180,6 +200,18 @@ fn page(summary: &Summary, found: &Estimate, rooms: &Rooms) -> Vec<String> {
     if !summary.silent.is_empty() {
         lines.push(format!("no reading of {}", summary.silent.join(", ")));
     }
+    lines.extend(summary.hints.iter().cloned());
+    let misfit = summary.misfit;
+    if misfit < MISFIT {
+        lines.push(format!(
+            "misfit {misfit:.1e}: one leak in these rooms does not explain the readings. Do not trust the rooms: walls, air, a sensor, its noise or the \
+             number of leaks are others"
+        ));
+    } else {
+        lines.push(format!(
+            "misfit {misfit:.3}: readings at least as surprising as these are expected in this share of cases"
+        ));
+    }
     let shown = |(name, p): &(String, f64)| format!("{name} {p:.3}");
     let all: Vec<String> = summary.rooms.iter().filter(|(_, p)| *p >= 5e-4).map(shown).collect();
     lines.push(format!("the leak is in: {}", all.join(", ")));
@@ -193,16 +225,5 @@ fn page(summary: &Summary, found: &Estimate, rooms: &Rooms) -> Vec<String> {
             .iter()
             .map(|line| format!("  {line}")),
     );
-    let misfit = summary.misfit;
-    if misfit < MISFIT {
-        lines.push(format!(
-            "misfit {misfit:.1e}: one leak in these rooms does not explain the readings. Do not trust the rooms: walls, air, a sensor, its noise or the \
-             number of leaks are others"
-        ));
-    } else {
-        lines.push(format!(
-            "misfit {misfit:.3}: readings at least as surprising as these are expected in this share of cases"
-        ));
-    }
     lines
 }

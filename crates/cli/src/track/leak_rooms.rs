@@ -93,10 +93,24 @@ impl Rooms {
         self.sensor.iter().map(|sensor| sensor.name.as_str())
     }
 
+    /// Whether reports of a sensor are values.
+    pub(super) fn sends_values(&self, sensor: usize) -> bool {
+        self.sensor[sensor].thresholds.is_empty()
+    }
+
     /// The belief before readings whose times end at `last`, seconds after the first, and the area of each cell.
     pub(super) fn belief(&self, plan: &Plan, last: f64) -> Result<(LeakBelief, Transport), Error> {
         let refused = Error::refused("the rooms are refused");
-        let start = self.start.unwrap_or([-last.max(1.0), last]);
+        let start = match self.start {
+            Some(start) => start,
+            None if last > 0.0 => [-last, last],
+            None => {
+                return Err(Error::Needed {
+                    option: "`start` in the file of rooms",
+                    reason: "the readings have one time only, which does not say when the leak may have begun",
+                });
+            }
+        };
         if !start[0].is_finite() || start[0] >= last {
             let problem =
                 format!("start = {start:?}: the first is expected before the last reading, {last} s after the first");

@@ -6,7 +6,13 @@ use std::path::Path;
 
 fn house(name: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name);
-    std::fs::read_to_string(path).unwrap()
+    let text = std::fs::read_to_string(path).unwrap();
+    // Larger cells than the default, which take less time.
+    if name == "house.toml" {
+        format!("split = 1\n{text}")
+    } else {
+        text
+    }
 }
 
 /// The last row and the map of a run, of these rooms and readings.
@@ -104,4 +110,18 @@ fn what_cannot_be_is_refused_by_name() {
         let message = refused(folder.path(), &["leak", "-", "--rooms", "house.toml"], readings.as_bytes());
         assert!(message.contains(said), "{to}: {message}");
     }
+}
+
+/// The same belief is made of bits that are taken for values, and nothing in it says so.
+#[test]
+fn bits_without_thresholds_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let rooms = house("house.toml").replacen("thresholds = [5.0]\n", "", 1);
+    std::fs::write(folder.path().join("house.toml"), rooms).unwrap();
+    let words = ["leak", "-", "--rooms", "house.toml", "--last"];
+    let said = text(&fewbits(folder.path(), &words, house("house.csv").as_bytes()).stderr).to_owned();
+    assert!(said.contains("k1 reports 0 and 1 only") && !said.contains("b1 reports"), "{said}");
+    let rooms = house("house.toml").replace("start = [-600, 1800]", "");
+    std::fs::write(folder.path().join("house.toml"), rooms).unwrap();
+    assert!(refused(folder.path(), &words, b"time,sensor,reading\n5,k1,1\n").contains("`start` in the file of rooms"));
 }
