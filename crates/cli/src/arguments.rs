@@ -3,6 +3,7 @@
 use crate::design_options::DesignOptions;
 pub(crate) use crate::fit_options::FitOptions;
 pub(crate) use crate::fleet_options::{CentreOptions, CheckOptions, SensorOptions};
+pub(crate) use crate::leak_options::LeakOptions;
 pub(crate) use crate::ranges_options::RangesOptions;
 pub(crate) use crate::recording_options::{CatOptions, RepackOptions, UnpackOptions};
 pub(crate) use crate::table_options::{BoundOptions, DialectOptions, ManyOptions, TableOptions};
@@ -43,6 +44,8 @@ pub(crate) enum Task {
     Ranges(RangesOptions),
     /// Calibrate: find noise, offset, gain, drift and delay of each sensor and the change of the level from a table, with standard errors.
     Fit(FitOptions),
+    /// Find the room of a leak, its rate and its start from readings of sensors in rooms, of values or of few bits, at any times.
+    Leak(LeakOptions),
     /// Design quantizers of few bits for one unknown that several sensors measure.
     Design(DesignOptions),
     /// Send rows from standard input or a file as frames, to a file, a pipe, UDP or a serial line.

@@ -154,6 +154,11 @@ impl Files {
                 files.writes.extend(options.output.clone());
                 files
             }
+            Task::Leak(options) => {
+                let mut files = Self::reading(&options.table.file).writing([&options.output]);
+                files.reads.push(options.rooms.clone());
+                files
+            }
             Task::Ranges(options) => {
                 let mut files = Self::reading(&options.table.file).writing([&options.output, &options.plot]);
                 files.reads.push(PathBuf::from(&options.anchors));
@@ -239,6 +244,7 @@ fn check_names(task: &Task) -> Result<(), Error> {
         Task::Track(options) => (&options.output, rows(options.json, Written::Csv), &options.plot),
         Task::Ranges(options) => (&options.output, rows(options.json, Written::Csv), &options.plot),
         Task::Fit(options) => (&options.output, Written::Json, &None),
+        Task::Leak(options) => (&options.output, rows(options.json, Written::Csv), &None),
         Task::Plan(options) => (&None, Written::Csv, &options.plot),
         Task::Design(options) => {
             let written = match options.form {
@@ -285,6 +291,7 @@ fn table(task: &mut Task) -> Option<&mut TableOptions> {
         Task::Track(options) => Some(&mut options.table),
         Task::Ranges(options) => Some(&mut options.table),
         Task::Fit(options) => Some(&mut options.table),
+        Task::Leak(options) => Some(&mut options.table),
         Task::Send(options) => Some(&mut options.table),
         _ => None,
     }

@@ -19,6 +19,7 @@ mod identity;
 mod info;
 mod input;
 mod interrupt;
+mod leak_options;
 mod link;
 mod live;
 mod look;
@@ -112,6 +113,7 @@ fn run(mut task: Task) -> Result<Ending, Error> {
         Task::Track(options) => track::run(&options),
         Task::Ranges(options) => track::ranges(&options),
         Task::Fit(options) => track::fit(&options),
+        Task::Leak(options) => track::leak(&options),
         Task::Design(options) => design::run(&options),
         Task::Send(options) => send::run(&options),
         Task::Receive(options) => link::receive::run(&options),

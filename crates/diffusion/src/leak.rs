@@ -9,7 +9,8 @@ use std::sync::Arc;
 /// The probability of every cell, start and rate of one leak, given readings of sensors of a [`SensorField`].
 ///
 /// Besides the sensor's noise, a reading's variance counts what the response changes across a cell and between two starts and rates: the
-/// resolution of the belief itself. The lasting relative error of each sensor ([`LeakPrior::model_error`]) is integrated out.
+/// resolution of the belief itself. Half of that variance is an error that all values of a sensor share, and that is estimated from them; words have
+/// errors of their own. The lasting relative error of each sensor ([`LeakPrior::model_error`]) is integrated out.
 ///
 /// ```
 /// use fewbits_diffusion::{Flow, LeakBelief, LeakPrior, Plan, Reading, Scheme, SensorField, StepControl, Transport};
@@ -51,6 +52,8 @@ pub struct LeakBelief {
     logs: Vec<Option<Vec<f64>>>,
     /// The same with the sensor's error integrated out; only rates of the prior.
     shared: Vec<Option<Vec<f64>>>,
+    /// Per sensor whose values came, by cell, start and rate: mean and variance of the part of the error of resolution that its values share.
+    common: Vec<Option<Vec<(f64, f64)>>>,
     surprise: f64,
     variance: f64,
 }
@@ -58,6 +61,8 @@ pub struct LeakBelief {
 /// Number of starts and of rates of the belief.
 const STARTS: usize = 12;
 const RATES: usize = 24;
+/// Share of the variance of the error of resolution that all values of a sensor have in common.
+const COMMON: f64 = 0.5;
 /// Deviation of a uniform distribution of width 1.
 const UNIFORM: f64 = 0.288_675_134_594_812_9;
 
@@ -96,6 +101,7 @@ impl LeakBelief {
             log_rates: (0..RATES + 2 * reach).map(rate).collect(),
             logs: vec![None; field.sensor_count()],
             shared: vec![None; field.sensor_count()],
+            common: vec![None; field.sensor_count()],
             faults: prior.faults,
             domain,
             field,
@@ -119,11 +125,22 @@ impl LeakBelief {
         finite("time", time)?;
         positive("deviation", deviation)?;
         reading.check()?;
-        let laws = self.laws(sensor, time, deviation);
+        let resolved = self.resolved(sensor, time);
         let weights = self.weights(sensor);
         let predicted = |p: &[f64]| weights.iter().zip(p).map(|(weight, p)| weight * p).sum::<f64>();
         let (own, tested) = match reading {
             Reading::Value(value) => {
+                let mut common = self.common[sensor]
+                    .take()
+                    .unwrap_or_else(|| vec![(0.0, 1.0); resolved.len()]);
+                let laws: Vec<(f64, f64)> = resolved
+                    .iter()
+                    .zip(&common)
+                    .map(|((mean, error), (known, left))| {
+                        let variance = deviation * deviation + error * error * (1.0 - COMMON + COMMON * left);
+                        (mean + COMMON.sqrt() * error * known, variance.sqrt())
+                    })
+                    .collect();
                 let standard = |(mean, deviation): &(f64, f64)| (value - mean) / deviation;
                 let wide = self.widest(&laws);
                 let log = |law: &(f64, f64)| {
@@ -132,10 +149,23 @@ impl LeakBelief {
                 };
                 let below: Vec<f64> = laws.iter().map(|law| cdf(standard(law))).collect();
                 let share = predicted(&below).clamp(1e-12, 1.0 - 1e-12);
+                for (((_, error), law), (known, left)) in resolved.iter().zip(&laws).zip(&mut common) {
+                    // A faulty value tells nothing of the error.
+                    let density = (1.0 - self.faults) * (-0.5 * standard(law).powi(2)).exp() / law.1;
+                    let right = density / (density + self.faults / wide).max(f64::MIN_POSITIVE);
+                    let gain = right * COMMON.sqrt() * error * *left / law.1;
+                    *known += gain * standard(law);
+                    *left *= 1.0 - gain * COMMON.sqrt() * error / law.1;
+                }
+                self.common[sensor] = Some(common);
                 // Its quantile is normal under the right model; the square has mean 1 and variance 2.
                 (laws.iter().map(log).collect::<Vec<f64>>(), (quantile(share).powi(2) - 1.0, 2.0))
             }
             Reading::Word { edges, word } => {
+                let laws: Vec<(f64, f64)> = resolved
+                    .iter()
+                    .map(|(mean, error)| (*mean, deviation.hypot(*error)))
+                    .collect();
                 // Probabilities to be below each edge, and to be above it.
                 let tails = edges.iter().map(|edge| {
                     let standard = laws.iter().map(|(mean, deviation)| (edge - mean) / deviation);
@@ -186,8 +216,8 @@ impl LeakBelief {
             .fold(f64::MIN_POSITIVE, f64::max)
     }
 
-    /// Mean and deviation of what a sensor measures at a time, by cell, start and rate.
-    fn laws(&self, sensor: usize, time: f64, deviation: f64) -> Vec<(f64, f64)> {
+    /// Mean of what a sensor measures at a time, and the deviation of its error of resolution, by cell, start and rate.
+    fn resolved(&self, sensor: usize, time: f64) -> Vec<(f64, f64)> {
         let width = self.starts.get(1).map_or(0.0, |next| next - self.starts[0]);
         let step = self.log_rates[1] - self.log_rates[0];
         let rates: Vec<f64> = self.log_rates.iter().map(|log| log.exp()).collect();
@@ -206,11 +236,7 @@ impl LeakBelief {
                     .sum();
                 let relative =
                     across.powi(2) + (UNIFORM * (after - before)).powi(2) + (UNIFORM * step * response).powi(2);
-                laws.extend(
-                    rates
-                        .iter()
-                        .map(|rate| (rate * response, deviation.hypot(rate * relative.sqrt()))),
-                );
+                laws.extend(rates.iter().map(|rate| (rate * response, rate * relative.sqrt())));
             }
         }
         laws
@@ -322,20 +348,22 @@ impl LeakBelief {
     /// Mean and standard deviation of the rate's natural logarithm.
     pub fn log_rate(&self) -> (f64, f64) {
         let reach = self.gains.len() / 2;
-        let values = &self.log_rates[reach..reach + RATES];
-        self.moments(|index| values[index % RATES])
+        self.moments(&self.log_rates[reach..reach + RATES], |index| index % RATES)
     }
 
     /// Mean and standard deviation of the time at which the leak began, s.
     pub fn start(&self) -> (f64, f64) {
-        self.moments(|index| self.starts[index / RATES % self.starts.len()])
+        self.moments(&self.starts, |index| index / RATES % self.starts.len())
     }
 
-    fn moments(&self, of: impl Fn(usize) -> f64) -> (f64, f64) {
+    /// Moments of a quantity with evenly spaced values, each of which stands for all within half a step.
+    fn moments(&self, values: &[f64], of: impl Fn(usize) -> usize) -> (f64, f64) {
         let all = self.probabilities();
-        let mean: f64 = all.iter().enumerate().map(|(i, p)| p * of(i)).sum();
-        let variance: f64 = all.iter().enumerate().map(|(i, p)| p * (of(i) - mean).powi(2)).sum();
-        (mean, variance.sqrt())
+        let within = UNIFORM * values.get(1).map_or(0.0, |next| next - values[0]);
+        let mean: f64 = all.iter().enumerate().map(|(i, p)| p * values[of(i)]).sum();
+        let square = |(i, p): (usize, &f64)| p * (values[of(i)] - mean).powi(2);
+        let variance: f64 = all.iter().enumerate().map(square).sum();
+        (mean, variance.sqrt().hypot(within))
     }
 
     /// Probability that readings are as surprising as these if the model is right: each is compared with its predictive distribution, given those

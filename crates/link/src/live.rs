@@ -31,6 +31,8 @@ struct Shown<'a> {
     estimate: &'a [(f64, f64)],
     /// Per sensor the bits of its report; -1 for nothing, -2 for lost.
     observed: Vec<i64>,
+    asked: &'a [bool],
+    names: &'a [String],
     numbers: &'a [u32],
     trouble: Option<&'a str>,
     health: &'a [SensorHealth],
@@ -77,6 +79,7 @@ impl Shared {
 pub struct LivePage {
     shared: Arc<Shared>,
     numbers: Vec<u32>,
+    names: Vec<String>,
     period: f64,
     address: SocketAddr,
 }
@@ -109,9 +112,16 @@ impl LivePage {
         Ok(Self {
             shared,
             numbers,
+            names: Vec::new(),
             period,
             address: server.address(),
         })
+    }
+
+    /// The same page with a name for each coordinate of the state, perhaps with its unit.
+    #[must_use]
+    pub fn with_names(self, names: Vec<String>) -> Self {
+        Self { names, ..self }
     }
 
     /// Address of the page.
@@ -131,6 +141,8 @@ impl LivePage {
             period: self.period,
             estimate: &step.estimate,
             observed: observed.collect(),
+            asked: &step.asked,
+            names: &self.names,
             numbers: &self.numbers,
             trouble: step.trouble.as_deref(),
             health: &step.health,

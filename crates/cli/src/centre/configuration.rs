@@ -33,7 +33,7 @@ pub(super) struct Configuration {
     pub(super) fleet: Option<FleetKey>,
     /// Broker and name of the fleet at which Home Assistant finds the estimates.
     pub(super) home_assistant: Option<String>,
-    /// Names and units of the coordinates of the state there.
+    /// Names and units of the coordinates of the state there and on the page.
     pub(super) coordinates: Vec<Coordinate>,
 }
 
@@ -65,13 +65,18 @@ pub(super) enum Model {
 }
 
 impl Model {
+    /// What the coordinates of the state are, if nothing names them.
+    fn names(self) -> &'static [&'static str] {
+        match self {
+            Self::RandomWalk { .. } | Self::OrnsteinUhlenbeck { .. } => &["level"],
+            Self::ConstantVelocity { .. } => &["position", "velocity"],
+            Self::ConstantVelocity2d { .. } => &["x", "velocity of x", "y", "velocity of y"],
+        }
+    }
+
     /// Number of coordinates of the state.
     pub(super) fn coordinates(self) -> usize {
-        match self {
-            Self::RandomWalk { .. } | Self::OrnsteinUhlenbeck { .. } => 1,
-            Self::ConstantVelocity { .. } => 2,
-            Self::ConstantVelocity2d { .. } => 4,
-        }
+        self.names().len()
     }
 }
 
@@ -166,6 +171,18 @@ fn one_line(error: impl Display) -> String {
 }
 
 impl Configuration {
+    /// Name and unit of each coordinate of the state.
+    pub(super) fn named(&self) -> Vec<(String, String)> {
+        if self.coordinates.is_empty() {
+            let names = self.model.names().iter();
+            return names.map(|name| ((*name).to_owned(), String::new())).collect();
+        }
+        let given = self.coordinates.iter();
+        given
+            .map(|coordinate| (coordinate.name.clone(), coordinate.unit.clone()))
+            .collect()
+    }
+
     /// Reads a file.
     ///
     /// # Errors

@@ -38,21 +38,17 @@ pub(super) struct Home {
 
 impl Home {
     /// Connects, and says what is to be found. `None` if the configuration names no broker.
-    pub(super) fn open(given: &Configuration, numbers: &[u32], coordinates: usize) -> Result<Option<Self>, Error> {
+    pub(super) fn open(given: &Configuration, numbers: &[u32]) -> Result<Option<Self>, Error> {
         let Some(text) = &given.home_assistant else {
             return Ok(None);
         };
         let (broker, fleet) =
             crate::place::home_assistant(text).map_err(|error| Error::content("home_assistant", error))?;
-        let named = |i: usize| match given.coordinates.get(i) {
-            Some(coordinate) => (coordinate.name.clone(), coordinate.unit.clone()),
-            None => (format!("estimate {i}"), String::new()),
-        };
         let fleet = Fleet {
             name: fleet.to_owned(),
             period: given.period,
             sensors: numbers.to_vec(),
-            coordinates: (0..coordinates).map(named).collect(),
+            coordinates: given.named(),
         };
         let broker = connect(broker)?;
         fleet.discovery().iter().for_each(|message| broker.publish(message));

@@ -203,12 +203,20 @@ fn serve<R: Receiver, T: Transport>(
     let page = match options.live {
         Some(address) => {
             let page = fewbits_link::LivePage::serve(address, numbers.clone(), given.period)?;
+            let name = |(name, unit): (String, String)| {
+                if unit.is_empty() {
+                    name
+                } else {
+                    format!("{name} ({unit})")
+                }
+            };
+            let page = page.with_names(given.named().into_iter().map(name).collect());
             say!("page at http://{}/", page.address());
             Some(page)
         }
         None => None,
     };
-    let home = home::Home::open(given, &numbers, coordinates)?;
+    let home = home::Home::open(given, &numbers)?;
     let mut remaining = options.slots;
     // A signal ends the centre after the step of the slot, which is stored: another process goes on with the next slot.
     let stopped = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));

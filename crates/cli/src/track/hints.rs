@@ -65,11 +65,8 @@ pub(super) fn hints(
         let typical = median(steps.clone());
         if options.silent_within.is_none()
             && values.len() >= if is_dense { FEWEST_ROWS } else { FEWEST }
-            && if is_dense {
-                is_irregular(&timed)
-            } else {
-                silent > EMPTY * cells.len() as f64
-            }
+            && (is_dense || silent > EMPTY * cells.len() as f64)
+            && is_irregular(&timed)
             && least > 0.5 * typical
         {
             lines.push(format!(

@@ -228,6 +228,9 @@ fn text(step: &Step, names: &[String]) -> String {
     words.join("; ")
 }
 
+/// First rows from which it is found which columns report less often than rows come.
+const RHYTHM_ROWS: usize = 200;
+
 /// Runs the task.
 pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Ending, Error> {
     let settings = Settings::find(options, &mut instants)?;
@@ -250,8 +253,15 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
     let mut sheet = Sheet::new(options.output.as_deref(), Shape::of(options.json), names.collect())?;
     let lag = options.smooth.as_deref().map(lag).transpose()?;
     // Silence of a sensor that sends on change is no missing report.
-    let has_rhythm = options.table.by.is_some() && options.silent_within.is_none();
-    let mut rhythm = has_rhythm.then(Rhythm::default);
+    let mut rhythm = match (&options.table.by, &options.silent_within) {
+        (_, Some(_)) => None,
+        (Some(_), None) => Some(Rhythm::default()),
+        // Of a pipe no row is waited for.
+        (None, None) => {
+            let (columns, rows) = (instants.names.len(), if instants.is_live() { 0 } else { RHYTHM_ROWS });
+            Some(Rhythm::of_columns(columns, instants.peek(rows)?))
+        }
+    };
     let (mut waiting, mut between) = (Vec::new(), Vec::new());
     while let Some(mut instant) = instants.next()? {
         if !instant.is_row {

@@ -21,6 +21,7 @@
 //! | `level` | the task `track`: a level |
 //! | `ranges` | the task `ranges`: a place |
 //! | `anchors`, `odometry`, `path` | the table of its anchors, the columns of what the target moved, the picture |
+//! | `leak`, `leak_rooms` | the task `leak`: a room, and the file of rooms |
 //! | `height` | the height of its target |
 
 mod anchors;
@@ -37,6 +38,8 @@ mod held;
 mod hints;
 mod instant;
 mod late;
+mod leak;
+mod leak_rooms;
 mod level;
 mod limits;
 mod meaning;
@@ -56,7 +59,7 @@ mod targets;
 mod world;
 
 use crate::Ending;
-use crate::arguments::{FitOptions, Model, RangesOptions, TrackOptions};
+use crate::arguments::{FitOptions, LeakOptions, Model, RangesOptions, TrackOptions};
 use crate::error::Error;
 use columns::{Finds, Kind};
 use rows::Instants;
@@ -83,6 +86,11 @@ pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {
 /// Runs the task `fit`.
 pub(crate) fn fit(options: &FitOptions) -> Result<Ending, Error> {
     fit::run(options)
+}
+
+/// Runs the task `leak`.
+pub(crate) fn leak(options: &LeakOptions) -> Result<Ending, Error> {
+    leak::run(options)
 }
 
 /// Runs the task `ranges`.

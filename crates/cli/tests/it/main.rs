@@ -12,6 +12,7 @@ mod fleet;
 mod fresh;
 mod kills;
 mod language;
+mod leak;
 mod links;
 mod live;
 mod long;

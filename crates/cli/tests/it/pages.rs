@@ -44,6 +44,7 @@ fn listings_print_what_the_pages_say() {
         ("track.md", 2),
         ("ranges.md", 1),
         ("fit.md", 2),
+        ("leak.md", 1),
         ("quantizers.md", 1),
         ("record.md", 3),
     ] {
@@ -78,6 +79,7 @@ fn completions_and_manual_are_generated() {
         "fewbits-track.1",
         "fewbits-ranges.1",
         "fewbits-fit.1",
+        "fewbits-leak.1",
         "fewbits-design.1",
         "fewbits-pack.1",
     ] {

@@ -238,3 +238,30 @@ fn stuck_sensors_signal_strengths_and_reports_on_change_are_told() {
     let said = text(&fewbits(folder.path(), &words, strengths.as_bytes()).stderr);
     assert!(said.contains("Signal strengths in dBm"), "{said}");
 }
+
+/// Defect: a sensor with a value in each twentieth row was called dead and alive between its values, and was said to send on change.
+#[test]
+fn a_slower_sensor_is_dead_only_when_its_values_end() {
+    let (folder, mut numbers) = (tempfile::tempdir().unwrap(), Numbers(7));
+    let (mut level, mut table) = (20.0, "time,fast,slow\n".to_owned());
+    for row in 0..900 {
+        level += 0.05 * numbers.normal();
+        let (fast, slow) = (level + numbers.normal(), level + 0.1 * numbers.normal());
+        let slow = if row % 20 == 0 && row < 500 {
+            format!("{slow:.3}")
+        } else {
+            String::new()
+        };
+        table += &format!("{row},{fast:.3},{slow}\n");
+    }
+    std::fs::write(folder.path().join("t.csv"), &table).unwrap();
+    let said = text(&fewbits(folder.path(), &["track", "t.csv", "--json"], b"").stderr).to_owned();
+    let summary: Value = serde_json::from_str(said.lines().last().unwrap()).unwrap();
+    let events: Vec<&str> = summary["events"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|event| event["event"].as_str().unwrap())
+        .collect();
+    assert!(events == ["dead"] && !said.contains("on change"), "{said}");
+}

@@ -168,6 +168,28 @@ fn confused_sensors_are_a_misfit() {
     assert!(misfits[0] > 0.01 && misfits[1] < 1e-3, "{misfits:?}");
 }
 
+/// Defect: bands of start and rate did not count that a value of the grid stands for all around it, and were narrower than a second.
+#[test]
+fn bands_hold_a_start_and_a_rate_between_values_of_the_grid() {
+    let (field, transport) = field(1, 0.02);
+    let prior = LeakPrior {
+        start: [0.0, 600.0],
+        rate: [1e-7, 3e-6],
+        model_error: 0.1,
+        faults: 0.001,
+    };
+    let leak = transport.domain().locate([1.2, 1.7, 0.0]).unwrap();
+    let (mut belief, mut draws, start, rate) = (LeakBelief::new(field.clone(), &prior).unwrap(), Draws(5), 335.0, 2e-6);
+    for k in 0..40 {
+        let (sensor, time) = (k % 5, 2000.0 * draws.next());
+        let z = rate * response(&field, sensor, leak, time - start) + 0.01 * NOISE * draws.normal();
+        belief.observe(sensor, time, &Reading::Value(z), 0.01 * NOISE).unwrap();
+    }
+    for ((mean, deviation), truth) in [(belief.start(), start), (belief.log_rate(), f64::ln(rate))] {
+        assert!((mean - truth).abs() < 1.96 * deviation, "{mean} +- {deviation} for {truth}");
+    }
+}
+
 #[test]
 fn rooms_have_the_names_of_the_plan() {
     let plan = Plan::parse("#####\n#a.b#\n#####\n b = dining room\na = hall").unwrap();

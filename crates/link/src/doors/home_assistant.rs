@@ -85,7 +85,8 @@ impl Fleet {
         coordinates.chain(self.sensors.iter().map(sensor)).collect()
     }
 
-    /// The message of one step: estimates, their bands of 95 %, and `ON` for each sensor that is neither dead nor excluded.
+    /// The message of one step: estimates, their bands of 95 %, and `ON` for each sensor that is neither dead nor excluded. A sensor that
+    /// could not be asked, as nothing came from it yet, has no state: it is unknown.
     pub fn state(&self, step: &Step) -> Message {
         let mut content = serde_json::Map::new();
         content.insert("slot".to_owned(), step.slot.into());
@@ -102,7 +103,12 @@ impl Fleet {
         }
         for (i, number) in self.sensors.iter().enumerate() {
             let works = step.health.get(i).is_none_or(|health| !health.dead && !health.excluded);
-            content.insert(format!("sensor{number}"), if works { "ON" } else { "OFF" }.into());
+            let state = match step.asked.get(i) {
+                // The template makes `None` of it, which Home Assistant takes for an unknown state.
+                Some(false) => Value::Null,
+                _ => if works { "ON" } else { "OFF" }.into(),
+            };
+            content.insert(format!("sensor{number}"), state);
         }
         Message {
             topic: self.state_topic(),
@@ -124,27 +130,29 @@ mod tests {
         let fleet = Fleet {
             name: "hall 1/ä".to_owned(),
             period: 0.5,
-            sensors: vec![3, 8],
+            sensors: vec![3, 8, 9],
             coordinates: vec![
                 ("level".to_owned(), "°C".to_owned()),
                 ("slope".to_owned(), String::new()),
             ],
         };
-        let mut step = Step::new(4, vec![Observation::Nothing; 2], vec![(1.0, 0.5), (2.0, 0.25)]);
+        let mut step = Step::new(4, vec![Observation::Nothing; 3], vec![(1.0, 0.5), (2.0, 0.25)]);
         let health = |dead| SensorHealth {
             working: 0.1,
             dead,
             excluded: false,
         };
-        step.health = vec![health(false), health(true)];
+        // Nothing came from the last one, of which health therefore knows nothing.
+        step.health = vec![health(false), health(true), health(false)];
+        step.asked = vec![true, true, false];
         let state = fleet.state(&step);
         let values: Value = serde_json::from_str(&state.content).unwrap();
         assert_eq!(
-            (&values["low0"], &values["sensor3"], &values["sensor8"]),
-            (&json!(1.0 - 0.98), &json!("ON"), &json!("OFF"))
+            (&values["low0"], &values["sensor3"], &values["sensor8"], &values["sensor9"]),
+            (&json!(1.0 - 0.98), &json!("ON"), &json!("OFF"), &Value::Null)
         );
         let discovery = fleet.discovery();
-        assert_eq!(discovery.len(), 4);
+        assert_eq!(discovery.len(), 5);
         let mut identities = std::collections::HashSet::new();
         for message in discovery {
             let config: Value = serde_json::from_str(&message.content).unwrap();
@@ -157,7 +165,7 @@ mod tests {
                 .unwrap()
                 .strip_suffix(" }}")
                 .unwrap();
-            assert!(!values[name].is_null(), "{name}");
+            assert!(values.get(name).is_some(), "{name}");
         }
     }
 }

@@ -27,7 +27,8 @@ fn read_until(stream: &mut TcpStream, text: &str) -> String {
 }
 
 fn page() -> LivePage {
-    LivePage::serve(([127, 0, 0, 1], 0).into(), (0..3).collect(), 0.1).unwrap()
+    let page = LivePage::serve(([127, 0, 0, 1], 0).into(), (0..3).collect(), 0.1).unwrap();
+    page.with_names(vec!["level (m)".to_owned()])
 }
 
 /// A report, a silence and a loss; the second sensor is dead.
@@ -58,6 +59,7 @@ fn page_shows_past_and_coming_slots() {
     let mut events = ask(&page, "/events");
     let past = read_until(&mut events, "}\n");
     assert!(past.contains("text/event-stream") && past.contains("\"slot\":41"), "{past}");
+    assert!(past.contains("\"asked\":[true,true,true]") && past.contains("\"names\":[\"level (m)\"]"), "{past}");
     assert!(past.contains("\"observed\":[1,-1,-2]") && past.contains(",0.25]"), "{past}");
     assert!(past.contains("{\"working\":0.25,\"dead\":true,\"excluded\":false}"), "{past}");
     page.show(&step(42), Counts::default());

@@ -1,0 +1,202 @@
+//! The file of rooms of the task `leak`.
+
+use super::instant::Qualifier;
+use crate::error::Error;
+use fewbits_diffusion::{
+    Flow, LeakBelief, LeakPrior, Plan, PotentialFlow, Reading, Scheme, SensorField, StepControl, Transport,
+};
+use fewbits_table::Side;
+use serde::Deserialize;
+use std::path::Path;
+
+/// Ages of a response: so many between the longest and this share of it, each larger than the one before by the same factor.
+const AGES: usize = 20;
+const SHORTEST: f64 = 0.005;
+/// Largest number of cells times sensors: the belief of these takes about 1 GiB.
+const MOST_CELLS: usize = 200_000;
+
+/// Content of `rooms.toml`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Rooms {
+    pub(super) plan: String,
+    square: f64,
+    #[serde(default = "two")]
+    split: usize,
+    height: f64,
+    diffusivity: f64,
+    #[serde(default)]
+    flow: f64,
+    #[serde(default)]
+    decay: f64,
+    #[serde(default)]
+    background: f64,
+    rate: [f64; 2],
+    start: Option<[f64; 2]>,
+    #[serde(default = "tenth")]
+    model_error: f64,
+    #[serde(default = "thousandth")]
+    faults: f64,
+    sensor: Vec<Sensor>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Sensor {
+    name: String,
+    place: [f64; 2],
+    noise: f64,
+    #[serde(default)]
+    thresholds: Vec<f64>,
+}
+
+fn two() -> usize {
+    2
+}
+
+fn tenth() -> f64 {
+    0.1
+}
+
+fn thousandth() -> f64 {
+    0.001
+}
+
+impl Rooms {
+    pub(super) fn read(path: &Path) -> Result<Self, Error> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(Error::io(&file, "read"))?;
+        let rooms: Self = toml::from_str(&text).map_err(|fault| Error::content(&file, fault))?;
+        let names: Vec<&str> = rooms.names().collect();
+        if let Some(name) = names
+            .iter()
+            .find(|name| names.iter().filter(|other| other == name).count() > 1)
+        {
+            return Err(Error::content(&file, format_args!("two sensors `{name}`: each needs a name of its own")));
+        }
+        let positive = [("square", rooms.square), ("height", rooms.height)];
+        if let Some((name, value)) = positive.iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
+            return Err(Error::content(&file, format_args!("{name} = {value}: metres above 0 are expected")));
+        }
+        if !(rooms.flow >= 0.0 && rooms.background.is_finite()) {
+            let problem = format!(
+                "flow = {}, background = {}: m^3/s of 0 or more and a finite concentration are expected",
+                rooms.flow, rooms.background
+            );
+            return Err(Error::content(&file, problem));
+        }
+        Ok(rooms)
+    }
+
+    /// Names of the sensors.
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+        self.sensor.iter().map(|sensor| sensor.name.as_str())
+    }
+
+    /// Whether reports of a sensor are values.
+    pub(super) fn sends_values(&self, sensor: usize) -> bool {
+        self.sensor[sensor].thresholds.is_empty()
+    }
+
+    /// The belief before readings whose times end at `last`, seconds after the first, and the area of each cell.
+    pub(super) fn belief(&self, plan: &Plan, last: f64) -> Result<(LeakBelief, Transport), Error> {
+        let refused = Error::refused("the rooms are refused");
+        let start = match self.start {
+            Some(start) => start,
+            None if last > 0.0 => [-last, last],
+            None => {
+                return Err(Error::Needed {
+                    option: "`start` in the file of rooms",
+                    reason: "the readings have one time only, which does not say when the leak may have begun",
+                });
+            }
+        };
+        if !start[0].is_finite() || start[0] >= last {
+            let problem =
+                format!("start = {start:?}: the first is expected before the last reading, {last} s after the first");
+            return Err(Error::content("--rooms", problem));
+        }
+        let domain = plan.domain(self.square, self.split, 0.0).map_err(&refused)?;
+        if domain.free().len().saturating_mul(self.sensor.len()) > MOST_CELLS {
+            let problem = format!(
+                "{} cells and {} sensors: their product may be {MOST_CELLS} at most, take larger squares or split = 1",
+                domain.free().len(),
+                self.sensor.len()
+            );
+            return Err(Error::content("--rooms", problem));
+        }
+        let wind = match self.flow {
+            0.0 => Flow::still(&domain),
+            flow => PotentialFlow::new(&domain, flow / self.height).map_err(&refused)?.flow,
+        };
+        let transport =
+            Transport::new(domain, self.diffusivity, &wind, self.decay, Scheme::default()).map_err(&refused)?;
+        let points: Vec<[f64; 3]> = self
+            .sensor
+            .iter()
+            .map(|sensor| [sensor.place[0], sensor.place[1], 0.0])
+            .collect();
+        let longest = last - start[0];
+        let age = |i: usize| longest * SHORTEST.powf(1.0 - (i + 1) as f64 / AGES as f64);
+        let ages: Vec<f64> = (0..AGES).map(age).collect();
+        let field =
+            SensorField::transient(&transport, &points, &ages, StepControl::Tolerance(1e-3)).map_err(&refused)?;
+        let prior = LeakPrior {
+            start,
+            rate: self.rate,
+            model_error: self.model_error,
+            faults: self.faults,
+        };
+        Ok((LeakBelief::new(field, &prior).map_err(&refused)?, transport))
+    }
+
+    /// What a cell of the table says, and the deviation of its noise. The responses of a plane are amounts per area: a concentration times the
+    /// height.
+    pub(super) fn reading(&self, sensor: usize, cell: f64, qualifier: Qualifier) -> Result<(Reading, f64), String> {
+        let Sensor {
+            name,
+            noise,
+            thresholds,
+            ..
+        } = &self.sensor[sensor];
+        let amount = |concentration: f64| (concentration - self.background) * self.height;
+        let reading = match (qualifier.limit, thresholds.as_slice()) {
+            (Some(side), _) => Reading::Word {
+                edges: vec![amount(cell)],
+                word: usize::from(side == Side::Above),
+            },
+            (None, []) => Reading::Value(amount(cell)),
+            (None, thresholds) => {
+                let most = thresholds.len();
+                if !(cell.fract() == 0.0 && (0.0..=most as f64).contains(&cell)) {
+                    return Err(format!(
+                        "{name} reports {cell}: a whole number from 0 to {most} is expected, as it has {most} thresholds"
+                    ));
+                }
+                Reading::Word {
+                    edges: thresholds.iter().map(|edge| amount(*edge)).collect(),
+                    word: cell as usize,
+                }
+            }
+        };
+        Ok((reading, noise * self.height))
+    }
+
+    /// The plan as it is drawn, without the names of rooms, with a `*` in some squares, given by column and line of cells.
+    pub(super) fn drawn(&self, cells: impl Iterator<Item = [usize; 3]>) -> Vec<String> {
+        let lines = self
+            .plan
+            .lines()
+            .filter(|line| !line.trim().is_empty() && !line.contains('='));
+        let indent = lines
+            .clone()
+            .map(|line| line.len() - line.trim_start().len())
+            .min()
+            .unwrap_or(0);
+        let mut squares: Vec<Vec<char>> = lines.map(|line| line.chars().skip(indent).collect()).collect();
+        for [column, line, _] in cells {
+            squares[line / self.split][column / self.split] = '*';
+        }
+        squares.into_iter().map(String::from_iter).collect()
+    }
+}
