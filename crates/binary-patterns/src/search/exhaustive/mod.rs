@@ -37,22 +37,27 @@ impl LinearSearch {
             .into_iter()
             .filter(|s| s.mse <= least * (1.0 + TIE))
             .min_by(|a, b| a.masks.cmp(&b.masks))
-            .ok_or_else(|| {
-                let expected = format!("at least {}, the rank of the masks", self.bits);
-                ArgumentError::new("sensors", self.sensors, expected).into()
-            })
+            .ok_or_else(|| self.too_few())
+    }
+
+    fn too_few(&self) -> Error {
+        let expected = format!("at least {}, the rank of the masks", self.bits);
+        ArgumentError::new("sensors", self.sensors, expected).into()
     }
 
     /// All sets, best first, with errors accurate to `1e-9` of the source's variance.
     ///
     /// # Errors
-    /// If there are too many outcomes to enumerate, or more than `2^26` sets.
+    /// As [`Self::best`], or if there are more than `2^26` sets.
     pub fn ranking(&self) -> Result<Vec<MaskSet>, Error> {
         Error::at_most("the list of sets of masks", self.sets(), MAX_RANKED)?;
         self.run(usize::MAX)
     }
 
     fn run(&self, keep: usize) -> Result<Vec<MaskSet>, Error> {
+        if self.full_rank && self.sensors < self.bits {
+            return Err(self.too_few());
+        }
         Error::at_most("the list of sets of masks", self.sets(), MAX_SETS)?;
         // Distinct masks give the largest number of outcomes.
         let distinct = self.sensors.min((1 << self.bits) - 1) as u32;
@@ -121,6 +126,13 @@ mod tests {
         assert!(matches!(search(3, 2, 10.0).best(), Err(Error::Argument(e)) if e.name == "sensors"));
         assert_eq!(search(3, 2, 10.0).any_rank().best().unwrap().masks.len(), 2);
         assert!(search(3, 2, 10.0).with_forced(&[1, 2, 3]).is_err());
+        // Two masks do not tell eight cells apart.
+        for refused in [
+            search(3, 2, 10.0).best().map(|set| vec![set]),
+            search(3, 2, 10.0).ranking(),
+        ] {
+            assert!(refused.unwrap_err().to_string().contains("sensors"));
+        }
         assert!(search(3, 2, 10.0).with_forced(&[8]).is_err());
         let grid = CellGrid::from_breakpoints(vec![0.0, 1.0]).unwrap();
         assert!(LinearSearch::with_deviation(Source::uniform(1.0).unwrap(), grid, 0.1, 3).is_err());
