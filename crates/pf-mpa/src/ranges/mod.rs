@@ -32,6 +32,7 @@ mod root;
 mod rows;
 mod search;
 mod settings;
+mod step;
 
 pub use estimate::RangeEstimate;
 pub use heights::height_of;
@@ -48,7 +49,6 @@ use fewbits_core::Gaussian;
 use fewbits_core::RangeNoise;
 use fewbits_numerics::error::{finite, refuse, within};
 use fit::Calibration;
-use gaussian::Step;
 use mirror::add_mirrored;
 use nalgebra::Vector3;
 use odds::{
@@ -57,6 +57,7 @@ use odds::{
 use rows::{Collected, Latest};
 use settings::{Known, NEGLIGIBLE_OF_LEVELS};
 use std::collections::BTreeMap;
+use step::Step;
 
 /// Ranges between two searches for hypotheses that have become the same.
 const COMPARED: usize = 8;
@@ -282,10 +283,9 @@ impl RangeTracker {
         let (known, place) = (&self.known, &self.places[anchor]);
         let step = Step::over(elapsed, known.persistence, known.drift);
         let shares = shares_of(next);
-        let largest = shares.iter().copied().fold(0.0, f64::max);
         let (mut mean, mut square) = (0.0, 0.0);
         for (one, share) in next.iter_mut().zip(&shares) {
-            one.predict(known, &step, *share / largest);
+            one.predict(known, &step, *share);
             if let Some(clock) = known.clock.filter(|_| is_new) {
                 one.forget_bias(known, clock, place, anchor, range);
             }
@@ -303,7 +303,7 @@ impl RangeTracker {
                 let aside = if bits == 1 {
                     // Not the same side for an anchor each time.
                     let is_above = (self.pushed + self.pushed / self.places.len()).is_multiple_of(2);
-                    let size = uncertainty_of_noise(&known.noises, next, &shares) * variance.sqrt();
+                    let size = uncertainty_of_noise(&known.log_noises, next, &shares) * variance.sqrt();
                     if is_above { size } else { -size }
                 } else {
                     0.0

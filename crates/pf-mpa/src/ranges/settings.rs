@@ -25,9 +25,9 @@ mod shares {
 }
 /// Uncertainty of a noise or speed that is stated, as a factor.
 const STATED: f64 = 4.0;
-/// Weight below which a filter is left out. A level says less than a range in full: what is left out comes back later.
+/// Weight below which a filter is left out. A level says less than a range in full, so of levels more filters stay probable.
 const NEGLIGIBLE: f64 = 1e-4;
-pub(super) const NEGLIGIBLE_OF_LEVELS: f64 = 1e-6;
+pub(super) const NEGLIGIBLE_OF_LEVELS: f64 = 5e-5;
 /// Deviation by which the bias changes in a second, as a share of its own.
 const DRIFT: f64 = 0.002;
 
@@ -164,6 +164,8 @@ pub(super) struct Known {
     /// Deviations of the bank, and the steps between them as lists.
     pub(super) noises: Vec<f64>,
     pub(super) speeds: Vec<f64>,
+    pub(super) log_noises: Vec<f64>,
+    pub(super) log_speeds: Vec<f64>,
     pub(super) outliers: f64,
     pub(super) stray: f64,
     pub(super) persistence: f64,
@@ -256,6 +258,8 @@ impl RangeSettings {
             }
         };
         let spacing = if self.speed.is_some() { 2.0 } else { 2.5 };
+        let noises = steps(noise / noise_factor, noise, 2.0);
+        let speeds = steps(speed / speed_factor, speed * speed_factor, spacing);
         Ok(Known {
             axes,
             level,
@@ -263,8 +267,10 @@ impl RangeSettings {
             spreads: [spread, spread, deviation],
             line: Line::of(anchors),
             anchors_spread: spread,
-            noises: steps(noise / noise_factor, noise, 2.0),
-            speeds: steps(speed / speed_factor, speed * speed_factor, spacing),
+            log_noises: noises.iter().map(|one| one.ln()).collect(),
+            log_speeds: speeds.iter().map(|one| one.ln()).collect(),
+            noises,
+            speeds,
             outliers: self.outliers,
             stray,
             persistence: self.persistence,
