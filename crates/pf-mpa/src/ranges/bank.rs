@@ -13,7 +13,7 @@ const NOISE_CHANGES: f64 = 0.1 * SPEED_CHANGES;
 /// Ranges between two changes: they are rare, so they are computed together.
 const MIXED: u32 = 5;
 /// Probability per range of an anchor that it starts, or ceases, to send ranges that do not depend on the distance.
-const ANCHOR_CHANGES: f64 = 1e-3;
+pub(super) const ANCHOR_CHANGES: f64 = 1e-3;
 /// Share of a range's score that stays in the sum of an anchor's scores.
 const SCORE_KEPT: f64 = 0.9;
 /// A filter of more weight in its hypothesis is kept, however improbable the hypothesis is.

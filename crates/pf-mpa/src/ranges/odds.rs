@@ -56,7 +56,7 @@ impl Hypothesis {
     }
 
     /// Takes in the evidence of a range that determines the state.
-    fn weigh(&mut self, log_evidence: f64) {
+    pub(super) fn weigh(&mut self, log_evidence: f64) {
         self.log_weight += log_evidence - self.behind;
         (self.recent, self.behind) = (0.0, 0.0);
     }

@@ -191,9 +191,13 @@ impl RangeSettings {
         let count = anchors.len() as f64;
         let middle = anchors.iter().sum::<Vector3<f64>>() / count;
         let spread = (anchors.iter().map(|place| (place - middle).norm_squared()).sum::<f64>() / count).sqrt();
-        let scales = spread > 0.0 && spread.is_finite() && (spread * spread).is_normal();
-        if !scales {
+        if anchors.iter().all(|place| *place == anchors[0]) {
             return refuse("anchors", "all at one place", "anchors at different places");
+        }
+        // Squares of squares are computed.
+        if !spread.powi(4).is_normal() {
+            let size = anchors.iter().map(|place| (place - middle).amax()).fold(0.0, f64::max);
+            return refuse("anchors", format!("{size} from their middle"), "a unit in which this is 1e-70 to 1e70");
         }
         let or = |stated: Option<f64>, share: f64| stated.unwrap_or(share * spread);
         let factor = |factor: Option<f64>, stated: Option<f64>, unstated: f64| {
