@@ -1,9 +1,10 @@
 //! A hypothesis about the target: a bank of filters that differ in speed and noise, and how likely each anchor measures rightly.
 
 use super::arrived::Arrived;
-use super::gaussian::{Normal, Predicted, Step, merged};
+use super::gaussian::{Normal, Predicted, merge_into, merged};
 use super::rest::Rest;
 use super::settings::Known;
+use super::step::Step;
 use crate::Error;
 
 /// Probability per range that the speed changes: once in a few minutes. The noise is a property of the radio and changes less often.
@@ -12,7 +13,7 @@ const NOISE_CHANGES: f64 = 0.1 * SPEED_CHANGES;
 /// Ranges between two changes: they are rare, so they are computed together.
 const MIXED: u32 = 5;
 /// Probability per range of an anchor that it starts, or ceases, to send ranges that do not depend on the distance.
-const ANCHOR_CHANGES: f64 = 1e-3;
+pub(super) const ANCHOR_CHANGES: f64 = 1e-3;
 /// Share of a range's score that stays in the sum of an anchor's scores.
 const SCORE_KEPT: f64 = 0.9;
 /// A filter of more weight in its hypothesis is kept, however improbable the hypothesis is.
@@ -47,6 +48,26 @@ pub(super) struct Hypothesis {
     negligible: f64,
     /// The next range, by each filter.
     predicted: Vec<Predicted>,
+    /// A buffer.
+    mixed: Vec<Mixed>,
+}
+
+/// A filter after a change from its neighbours.
+#[derive(Debug)]
+struct Mixed {
+    weight: f64,
+    law: Normal,
+    is_new: bool,
+}
+
+impl Default for Mixed {
+    fn default() -> Self {
+        Self {
+            weight: 0.0,
+            law: Normal::unknown(),
+            is_new: false,
+        }
+    }
 }
 
 impl Clone for Hypothesis {
@@ -68,6 +89,7 @@ impl Clone for Hypothesis {
             rest: self.rest,
             negligible: self.negligible,
             predicted: self.predicted.clone(),
+            mixed: Vec::new(),
         }
     }
 
@@ -121,10 +143,11 @@ impl Hypothesis {
             rest: Rest::default(),
             negligible: 0.0,
             predicted: vec![Predicted::default(); count],
+            mixed: Vec::new(),
         }
     }
 
-    /// Moves all filters on, after speed and noise may have changed. `share`: its probability as a share of the best hypothesis's. The less
+    /// Moves all filters on, after speed and noise may have changed. `share`: its probability. The less
     /// it is, the fewer filters are kept.
     pub(super) fn predict(&mut self, known: &Known, step: &Step, share: f64) {
         // An anchor that is apart is improbable for long, and then needs the filters that were right all the time.
@@ -162,16 +185,18 @@ impl Hypothesis {
     }
 
     /// With probability `changes`, a filter becomes one of its two neighbours in a row of filters.
-    fn mix(&mut self, row: impl Iterator<Item = usize>, changes: f64, negligible: f64) {
-        let row: Vec<usize> = row.collect();
-        if row.len() < 2 || row.iter().all(|i| self.weights[*i] == 0.0) {
+    fn mix(&mut self, row: impl Iterator<Item = usize> + Clone, changes: f64, negligible: f64) {
+        if row.clone().nth(1).is_none() || row.clone().all(|i| self.weights[i] == 0.0) {
             return;
         }
-        let mut next: Vec<(usize, f64, Option<Normal>)> = Vec::with_capacity(row.len());
-        for (at, i) in row.iter().enumerate() {
-            let neighbours = [at.checked_sub(1), Some(at + 1)].map(|at| row.get(at?).copied());
+        let mut next = std::mem::take(&mut self.mixed);
+        next.resize_with(row.clone().count().max(next.len()), Mixed::default);
+        let (mut before, mut after) = (None, row.clone().skip(1));
+        for (i, mixed) in row.clone().zip(&mut next) {
+            let neighbours = [before, after.next()];
+            before = Some(i);
             let leaving = 0.5 * changes * neighbours.iter().flatten().count() as f64;
-            let staying = (1.0 - leaving) * self.weights[*i];
+            let staying = (1.0 - leaving) * self.weights[i];
             let arriving = || {
                 neighbours
                     .iter()
@@ -181,25 +206,21 @@ impl Hypothesis {
             };
             let added: f64 = arriving().map(|(weight, _)| weight).sum();
             let total = staying + added;
-            let moments = if total < negligible || added <= negligible * staying {
-                None
-            } else {
-                let own = (staying > 0.0).then_some((staying, *i));
-                merged(
-                    own.into_iter()
-                        .chain(arriving())
-                        .map(|(weight, j)| (weight, &self.filters[j])),
-                )
+            mixed.is_new = total >= negligible && added > negligible * staying && {
+                let own = (staying > 0.0).then_some((staying, i));
+                let parts = own.into_iter().chain(arriving());
+                merge_into(parts.map(|(weight, j)| (weight, &self.filters[j])), &mut mixed.law)
             };
-            let is_known = self.weights[*i] > 0.0 || moments.is_some();
-            next.push((*i, if is_known { total } else { 0.0 }, moments));
+            let is_known = self.weights[i] > 0.0 || mixed.is_new;
+            mixed.weight = if is_known { total } else { 0.0 };
         }
-        for (i, weight, moments) in next {
-            self.weights[i] = weight;
-            if let Some(moments) = moments {
-                self.filters[i] = moments;
+        for (i, mixed) in row.zip(&mut next) {
+            self.weights[i] = mixed.weight;
+            if mixed.is_new {
+                std::mem::swap(&mut self.filters[i], &mut mixed.law);
             }
         }
+        self.mixed = next;
     }
 
     /// Computes the moments of the next range of an anchor. Returns its mean and variance with noise.

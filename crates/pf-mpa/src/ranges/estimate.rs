@@ -112,8 +112,8 @@ pub(super) fn of(known: &Known, hypotheses: &[Hypothesis], lost: bool) -> Option
     let (mut noise, mut speed) = (0.0, 0.0);
     for (share, one) in shares.iter().zip(hypotheses) {
         for (i, weight) in one.weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-            noise += share * weight * known.noises[i % noises].ln();
-            speed += share * weight * known.speeds[i / noises].ln();
+            noise += share * weight * known.log_noises[i % noises];
+            speed += share * weight * known.log_speeds[i / noises];
         }
     }
     Some(RangeEstimate {
@@ -185,7 +185,11 @@ fn end(laws: &[(f64, f64, f64)], off: f64, target: f64) -> f64 {
     if laws.len() == 1 {
         return low;
     }
-    let mut x = 0.5 * (low + high);
+    // The end of the normal law with the mixture's moments is near.
+    let mean: f64 = laws.iter().map(|(share, mean, _)| share * mean).sum();
+    let variance =
+        |(share, centre, deviation): &(f64, f64, f64)| share * (deviation * deviation + (centre - mean).powi(2));
+    let mut x = (mean + off * laws.iter().map(variance).sum::<f64>().sqrt()).clamp(low, high);
     for _ in 0..STEPS {
         let (mut below, mut density) = (0.0, 0.0);
         for (share, mean, deviation) in laws {

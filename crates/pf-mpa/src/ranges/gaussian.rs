@@ -7,6 +7,7 @@
 //! ```
 
 use super::root::root;
+use super::step::Step;
 
 /// Calls a function with constant numbers of coordinates and positions, so that its loops are unrolled. Rare numbers of coordinates are `0`.
 macro_rules! of_size {
@@ -43,42 +44,6 @@ pub(super) struct Predicted {
     pub(super) cross: Vec<f64>,
 }
 
-/// What a stretch of time does to positions and velocities of one axis.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Step {
-    /// The velocity's share that stays, and the seconds that it lasts.
-    kept: f64,
-    reach: f64,
-    /// Added (co)variances for a velocity of unit deviation.
-    position: f64,
-    cross: f64,
-    velocity: f64,
-    /// Added variance of the common bias.
-    drift: f64,
-}
-
-impl Step {
-    /// Velocities that are forgotten within `persistence` (Ornstein-Uhlenbeck), over `seconds`.
-    pub(super) fn over(seconds: f64, persistence: f64, drift: f64) -> Self {
-        let (u, kept) = (seconds / persistence, (-seconds / persistence).exp());
-        // `2u - 3 + 4k - k^2` cancels for short steps; its series begins with `2 u^3 / 3`.
-        let position = if u < 1e-3 {
-            u * u * u * (2.0 / 3.0 - 0.5 * u)
-        } else {
-            2.0 * u - 3.0 + 4.0 * kept - kept * kept
-        };
-        let lost = -(-u).exp_m1();
-        Self {
-            kept,
-            reach: persistence * lost,
-            position: persistence * persistence * position,
-            cross: persistence * lost * lost,
-            velocity: -(-2.0 * u).exp_m1(),
-            drift: drift * seconds,
-        }
-    }
-}
-
 impl Clone for Normal {
     fn clone(&self) -> Self {
         Self {
@@ -91,9 +56,13 @@ impl Clone for Normal {
 
     /// Copies into the buffers that are there.
     fn clone_from(&mut self, from: &Self) {
-        self.mean.clone_from(&from.mean);
-        self.covariance.clone_from(&from.covariance);
         (self.axes, self.only) = (from.axes, from.only);
+        if self.mean.len() == from.mean.len() {
+            of_size!(self.copy_of(from));
+        } else {
+            self.mean.clone_from(&from.mean);
+            self.covariance.clone_from(&from.covariance);
+        }
     }
 }
 
@@ -106,6 +75,12 @@ impl Normal {
             axes: 0,
             only: None,
         }
+    }
+
+    fn copy_of<const N: usize, const AXES: usize>(&mut self, from: &Self) {
+        let n = if N > 0 { N } else { self.mean.len() };
+        self.mean[..n].copy_from_slice(&from.mean[..n]);
+        self.covariance[..n * n].copy_from_slice(&from.covariance[..n * n]);
     }
 
     pub(super) fn bias(&self) -> usize {
@@ -327,40 +302,45 @@ impl Normal {
 
 /// The normal law with the moments of a mixture. Weights need not sum to one; `None` if they sum to zero.
 pub(super) fn merged<'a>(parts: impl Iterator<Item = (f64, &'a Normal)> + Clone) -> Option<Normal> {
+    let mut out = Normal::unknown();
+    merge_into(parts, &mut out).then_some(out)
+}
+
+/// The same in a buffer that is there. Returns whether there is such a law.
+pub(super) fn merge_into<'a>(parts: impl Iterator<Item = (f64, &'a Normal)> + Clone, out: &mut Normal) -> bool {
     let total: f64 = parts.clone().map(|(weight, _)| weight).sum();
-    let first = parts.clone().next()?.1;
-    if total <= 0.0 || !total.is_finite() {
-        return None;
-    }
+    let Some((_, first)) = parts.clone().next().filter(|_| total > 0.0 && total.is_finite()) else {
+        return false;
+    };
     let n = first.mean.len();
-    let mut mean = vec![0.0; n];
+    (out.axes, out.only) = (first.axes, first.only);
+    out.mean.clear();
+    out.mean.resize(n, 0.0);
+    out.covariance.clear();
+    out.covariance.resize(n * n, 0.0);
     for (weight, part) in parts.clone() {
         let share = weight / total;
-        mean.iter_mut().zip(&part.mean).for_each(|(sum, x)| *sum += share * x);
+        out.mean
+            .iter_mut()
+            .zip(&part.mean)
+            .for_each(|(sum, x)| *sum += share * x);
     }
-    let (mut covariance, mut off) = (vec![0.0; n * n], vec![0.0; n]);
     for (weight, part) in parts {
         let share = weight / total;
-        for ((off, x), mean) in off.iter_mut().zip(&part.mean).zip(&mean) {
-            *off = x - mean;
-        }
-        for ((sums, row), off_of_row) in covariance
+        let (means, centre) = (&part.mean[..n], &out.mean[..n]);
+        for (i, (sums, row)) in out
+            .covariance
             .chunks_exact_mut(n)
             .zip(part.covariance.chunks_exact(n))
-            .zip(&off)
+            .enumerate()
         {
-            let between = share * off_of_row;
-            for ((sum, x), off) in sums.iter_mut().zip(row).zip(&off) {
-                *sum += share * x + between * off;
+            let between = share * (means[i] - centre[i]);
+            for (((sum, x), own), mean) in sums.iter_mut().zip(row).zip(means).zip(centre) {
+                *sum += share * x + between * (own - mean);
             }
         }
     }
-    Some(Normal {
-        mean,
-        covariance,
-        axes: first.axes,
-        only: first.only,
-    })
+    true
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@
 //! ```
 
 mod acquisition;
+mod again;
 mod arrived;
 mod asked;
 mod bank;
@@ -22,6 +23,7 @@ mod estimate;
 mod fit;
 mod gaussian;
 mod heights;
+mod late;
 mod line;
 mod mirror;
 mod mistakes;
@@ -32,6 +34,7 @@ mod root;
 mod rows;
 mod search;
 mod settings;
+mod step;
 
 pub use estimate::RangeEstimate;
 pub use heights::height_of;
@@ -48,22 +51,17 @@ use fewbits_core::Gaussian;
 use fewbits_core::RangeNoise;
 use fewbits_numerics::error::{finite, refuse, within};
 use fit::Calibration;
-use gaussian::Step;
+use late::with_late;
 use mirror::add_mirrored;
 use nalgebra::Vector3;
-use odds::{
-    calibration_of, count_contradictions, drop_improbable, is_lost, merge_same, shares_of, uncertainty_of_noise, weigh,
-};
+use odds::{count_contradictions, drop_improbable, is_lost, merge_same, shares_of, uncertainty_of_noise, weigh};
 use rows::{Collected, Latest};
 use settings::{Known, NEGLIGIBLE_OF_LEVELS};
 use std::collections::BTreeMap;
+use step::Step;
 
 /// Ranges between two searches for hypotheses that have become the same.
 const COMPARED: usize = 8;
-/// Added to the variances of bias and scale over a silence, as a share of those before the first range.
-const SILENT_SHARE: f64 = 0.04;
-/// Deviation of the position before the first range after a loss, at most, in spreads of the anchors.
-const FARTHEST: f64 = 4.0;
 /// Bits of a range that is sent in full.
 const FULL_BITS: usize = 32;
 
@@ -282,16 +280,17 @@ impl RangeTracker {
         let (known, place) = (&self.known, &self.places[anchor]);
         let step = Step::over(elapsed, known.persistence, known.drift);
         let shares = shares_of(next);
-        let largest = shares.iter().copied().fold(0.0, f64::max);
         let (mut mean, mut square) = (0.0, 0.0);
+        let mut expectations: Vec<(f64, f64)> = Vec::with_capacity(next.len());
         for (one, share) in next.iter_mut().zip(&shares) {
-            one.predict(known, &step, *share / largest);
+            one.predict(known, &step, *share);
             if let Some(clock) = known.clock.filter(|_| is_new) {
                 one.forget_bias(known, clock, place, anchor, range);
             }
             let (expected, variance) = one.expect(known, place, anchor);
             mean += share * expected;
             square += share * (variance + expected * expected);
+            expectations.push((expected, variance));
         }
         let arrived = match self.travel {
             Travel::Full if known.clock.is_some() && is_new => Arrived::First(f64::from(range as f32)),
@@ -303,7 +302,7 @@ impl RangeTracker {
                 let aside = if bits == 1 {
                     // Not the same side for an anchor each time.
                     let is_above = (self.pushed + self.pushed / self.places.len()).is_multiple_of(2);
-                    let size = uncertainty_of_noise(&known.noises, next, &shares) * variance.sqrt();
+                    let size = uncertainty_of_noise(&known.log_noises, next, &shares) * variance.sqrt();
                     if is_above { size } else { -size }
                 } else {
                     0.0
@@ -322,6 +321,11 @@ impl RangeTracker {
             known.scale > 0.0 && one.usable(|other| last - heard[other] <= known.silence) < known.axes + 2
         };
         let is_undecided = next.iter().all(is_short);
+        let enough = |one: &Hypothesis| one.usable(|other| last - heard[other] <= known.silence) > known.axes + 1;
+        let mut late = match arrived {
+            Arrived::Value(value) => with_late(known, next, &expectations, &shares, anchor, value, enough),
+            _ => Vec::new(),
+        };
         let mut evidences: Vec<(bool, f64)> = Vec::with_capacity(next.len());
         next.retain_mut(|one| {
             let short = is_short(one);
@@ -339,6 +343,7 @@ impl RangeTracker {
             }
         });
         weigh(next, &evidences);
+        next.append(&mut late);
         // Anchors that send ranges, but contradict each other so much that those that are left do not determine the position.
         count_contradictions(next, known.axes + 1, |other| last - heard[other] <= known.silence);
         // One anchor that is apart and others that contradict: an explanation that leaves too few anchors for a place is none beside others.
@@ -359,41 +364,5 @@ impl RangeTracker {
 
     fn estimate(&self, lost: bool) -> Option<RangeEstimate> {
         estimate::of(&self.known, &self.hypotheses, lost)
-    }
-
-    /// Starts acquisition again after a silence. What all hypotheses together say of bias and scale is kept, with larger variances.
-    fn pause(&mut self) {
-        let priors = [self.known.bias, self.known.scale].map(|deviation| deviation * deviation);
-        if let Some(found) = calibration_of(&self.hypotheses) {
-            for ((known, (mean, variance)), prior) in self.calibration.iter_mut().zip(found).zip(priors) {
-                let variance = variance + SILENT_SHARE * prior;
-                *known = if variance.is_finite() && mean * mean < 9.0 * prior {
-                    (mean, variance.min(prior))
-                } else {
-                    (0.0, prior)
-                };
-            }
-        }
-        self.begin();
-    }
-
-    /// Starts acquisition again after the ranges have shown that no hypothesis is right: none of them says what bias and scale are.
-    fn forget(&mut self) {
-        self.calibration = [self.known.bias, self.known.scale].map(|deviation| (0.0, deviation * deviation));
-        self.begin();
-    }
-
-    fn begin(&mut self) {
-        // The target may be as far from the anchors as it was.
-        if let Some(found) = self.estimate(false) {
-            let (spread, middle) = (self.known.anchors_spread, Vector3::from(self.known.middle));
-            let far = (found.position - middle).xy().norm();
-            self.known.spreads[..2].fill(far.clamp(spread, FARTHEST * spread));
-        }
-        self.hypotheses.clear();
-        self.tried = 0;
-        if self.travel != Travel::Full {
-            self.collected.clear();
-        }
     }
 }

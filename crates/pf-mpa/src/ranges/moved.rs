@@ -3,8 +3,8 @@
 use super::RangeTracker;
 use super::bank::Hypothesis;
 use super::estimate::RangeEstimate;
-use super::gaussian::Step;
 use super::settings::Known;
+use super::step::Step;
 use crate::Error;
 use fewbits_numerics::error::{finite, refuse};
 use nalgebra::Vector3;

@@ -56,7 +56,7 @@ impl Hypothesis {
     }
 
     /// Takes in the evidence of a range that determines the state.
-    fn weigh(&mut self, log_evidence: f64) {
+    pub(super) fn weigh(&mut self, log_evidence: f64) {
         self.log_weight += log_evidence - self.behind;
         (self.recent, self.behind) = (0.0, 0.0);
     }
@@ -181,11 +181,11 @@ pub(super) fn is_lost(hypotheses: &[Hypothesis], are_levels: bool) -> bool {
 }
 
 /// The deviation of `ln` of the noise over all filters, at most [`ASIDE`].
-pub(super) fn uncertainty_of_noise(noises: &[f64], hypotheses: &[Hypothesis], shares: &[f64]) -> f64 {
+pub(super) fn uncertainty_of_noise(log_noises: &[f64], hypotheses: &[Hypothesis], shares: &[f64]) -> f64 {
     let (mut mean, mut square) = (0.0, 0.0);
     for (one, share) in hypotheses.iter().zip(shares) {
         for (i, weight) in one.weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-            let log = noises[i % noises.len()].ln();
+            let log = log_noises[i % log_noises.len()];
             mean += share * weight * log;
             square += share * weight * log * log;
         }

@@ -25,9 +25,9 @@ mod shares {
 }
 /// Uncertainty of a noise or speed that is stated, as a factor.
 const STATED: f64 = 4.0;
-/// Weight below which a filter is left out. A level says less than a range in full: what is left out comes back later.
+/// Weight below which a filter is left out. A level says less than a range in full, so of levels more filters stay probable.
 const NEGLIGIBLE: f64 = 1e-4;
-pub(super) const NEGLIGIBLE_OF_LEVELS: f64 = 1e-6;
+pub(super) const NEGLIGIBLE_OF_LEVELS: f64 = 5e-5;
 /// Deviation by which the bias changes in a second, as a share of its own.
 const DRIFT: f64 = 0.002;
 
@@ -164,6 +164,8 @@ pub(super) struct Known {
     /// Deviations of the bank, and the steps between them as lists.
     pub(super) noises: Vec<f64>,
     pub(super) speeds: Vec<f64>,
+    pub(super) log_noises: Vec<f64>,
+    pub(super) log_speeds: Vec<f64>,
     pub(super) outliers: f64,
     pub(super) stray: f64,
     pub(super) persistence: f64,
@@ -189,9 +191,13 @@ impl RangeSettings {
         let count = anchors.len() as f64;
         let middle = anchors.iter().sum::<Vector3<f64>>() / count;
         let spread = (anchors.iter().map(|place| (place - middle).norm_squared()).sum::<f64>() / count).sqrt();
-        let scales = spread > 0.0 && spread.is_finite() && (spread * spread).is_normal();
-        if !scales {
+        if anchors.iter().all(|place| *place == anchors[0]) {
             return refuse("anchors", "all at one place", "anchors at different places");
+        }
+        // Squares of squares are computed.
+        if !spread.powi(4).is_normal() {
+            let size = anchors.iter().map(|place| (place - middle).amax()).fold(0.0, f64::max);
+            return refuse("anchors", format!("{size} from their middle"), "a unit in which this is 1e-70 to 1e70");
         }
         let or = |stated: Option<f64>, share: f64| stated.unwrap_or(share * spread);
         let factor = |factor: Option<f64>, stated: Option<f64>, unstated: f64| {
@@ -256,6 +262,8 @@ impl RangeSettings {
             }
         };
         let spacing = if self.speed.is_some() { 2.0 } else { 2.5 };
+        let noises = steps(noise / noise_factor, noise, 2.0);
+        let speeds = steps(speed / speed_factor, speed * speed_factor, spacing);
         Ok(Known {
             axes,
             level,
@@ -263,8 +271,10 @@ impl RangeSettings {
             spreads: [spread, spread, deviation],
             line: Line::of(anchors),
             anchors_spread: spread,
-            noises: steps(noise / noise_factor, noise, 2.0),
-            speeds: steps(speed / speed_factor, speed * speed_factor, spacing),
+            log_noises: noises.iter().map(|one| one.ln()).collect(),
+            log_speeds: speeds.iter().map(|one| one.ln()).collect(),
+            noises,
+            speeds,
             outliers: self.outliers,
             stray,
             persistence: self.persistence,

@@ -452,6 +452,22 @@ fn rounded_ranges_at_rest_tell_no_height() {
     assert_eq!(height_of(&anchors, RangeSettings::default(), &ranges).unwrap(), None);
 }
 
+/// Anchors whose places no number of a range's size can tell are refused for that, and not as if they stood at one place.
+#[test]
+fn anchors_in_an_absurd_unit_are_refused_for_their_unit() {
+    let refusal = |unit: f64| {
+        let anchors = hall().into_iter().map(|(name, place)| (name, unit * place));
+        let tracker = RangeTracker::new(anchors, Travel::Full, RangeSettings::default());
+        tracker.map(|_| ()).map_err(|error| error.to_string())
+    };
+    for unit in [1e200, 1e-200] {
+        let found = refusal(unit).unwrap_err();
+        assert!(found.contains("unit") && !found.contains("one place"), "{found}");
+    }
+    assert!(refusal(0.0).unwrap_err().contains("one place"));
+    assert!([1e12, 1e-9].into_iter().all(|unit| refusal(unit).is_ok()));
+}
+
 /// Ranges of the hall that a table has wrong are explained by what is wrong, and right ones, or one long anchor, by nothing.
 #[test]
 fn mistakes_of_tables_are_found() {
@@ -482,6 +498,57 @@ fn mistakes_of_tables_are_found() {
     assert_eq!(found(&turned, &as_they_are, &mut noise), Some(Mistake::Axes("h1".to_owned())));
     assert_eq!(found(&anchors, &|_, range| range * range, &mut noise), Some(Mistake::Squared));
     assert_eq!(found(&anchors, &|_, range| range / 0.149_896_229, &mut noise), Some(Mistake::RoundTrip));
+}
+
+/// Four minutes in the hall in which two anchors are late together, again and again. Returns rows, coordinates held, the longest time wrong, and the root
+/// mean square of the error.
+fn late_together(seed: u64) -> (usize, usize, usize, f64) {
+    let anchors = hall();
+    let mut rng = Stream::new(seed).named("late").rng();
+    let model = ContinuousLinear::forgotten_velocity_2d(0.7, 6.0).unwrap();
+    let mut state = Vector4::new(6.0, 0.0, 5.0, 0.0);
+    let mut tracker = RangeTracker::new(anchors.clone(), Travel::Full, RangeSettings::default()).unwrap();
+    let (mut lateness, mut held, mut rows, mut wrong, mut longest, mut squares) = (0.0, 0, 0, 0, 0, 0.0);
+    for k in 0..1200_usize {
+        let time = 0.2 * k as f64;
+        state = model.over(0.2).unwrap().propagate(&mut rng, &state);
+        if lateness > 0.0 && rng.random::<f64>() < 0.025 {
+            lateness = 0.0;
+        } else if lateness == 0.0 && time > 20.0 && rng.random::<f64>() < 0.017 {
+            lateness = 0.5 + 2.5 * rng.random::<f64>();
+        }
+        let own = [0.0, 0.0, 0.7, 1.0, 0.0][k % 5] * lateness;
+        let truth = Vector3::new(state[0], state[2], 0.0);
+        let (name, place) = &anchors[k % 5];
+        let range = (truth - place).norm() + own + 0.2 + 0.04 * rng.sample::<f64, _>(StandardNormal);
+        let Some(found) = tracker.push(time, name, range).unwrap() else {
+            continue;
+        };
+        rows += 1;
+        held += (0..2)
+            .filter(|i| (found.bands[*i].0..=found.bands[*i].1).contains(&truth[*i]))
+            .count();
+        squares += (found.position - truth).norm_squared();
+        let is_wrong = found.normalised_error(&truth).unwrap() > WRONG && !found.lost;
+        wrong = if is_wrong { wrong + 1 } else { 0 };
+        longest = longest.max(wrong);
+    }
+    (rows, held, longest, (squares / rows as f64).sqrt())
+}
+
+/// Defect: the first range of an anchor that became late was taken for one that the target had moved, so that good anchors contradicted it and were left
+/// out: the place was metres off for minutes.
+#[test]
+fn anchors_that_are_late_for_a_while_are_left_out() {
+    let (mut rows, mut held) = (0, 0);
+    for seed in [0, 1, 2, 24, 133, 171] {
+        let found = late_together(seed);
+        println!("{found:?}");
+        assert!(found.2 < LONG && found.3 < 1.0, "seed {seed}: {found:?}");
+        rows += 2 * found.0;
+        held += found.1;
+    }
+    assert!(100 * held > 90 * rows, "{held} of {rows}");
 }
 
 fn number(name: &str) -> Option<u64> {

@@ -1,0 +1,48 @@
+//! The start of another acquisition.
+
+use super::odds::calibration_of;
+use super::{RangeTracker, Travel};
+use nalgebra::Vector3;
+
+/// Added to the variances of bias and scale over a silence, as a share of those before the first range.
+const SILENT_SHARE: f64 = 0.04;
+/// Deviation of the position before the first range after a loss, at most, in spreads of the anchors.
+const FARTHEST: f64 = 4.0;
+
+impl RangeTracker {
+    /// Starts acquisition again after a silence. What all hypotheses together say of bias and scale is kept, with larger variances.
+    pub(super) fn pause(&mut self) {
+        let priors = [self.known.bias, self.known.scale].map(|deviation| deviation * deviation);
+        if let Some(found) = calibration_of(&self.hypotheses) {
+            for ((known, (mean, variance)), prior) in self.calibration.iter_mut().zip(found).zip(priors) {
+                let variance = variance + SILENT_SHARE * prior;
+                *known = if variance.is_finite() && mean * mean < 9.0 * prior {
+                    (mean, variance.min(prior))
+                } else {
+                    (0.0, prior)
+                };
+            }
+        }
+        self.begin();
+    }
+
+    /// Starts acquisition again after the ranges have shown that no hypothesis is right: none of them says what bias and scale are.
+    pub(super) fn forget(&mut self) {
+        self.calibration = [self.known.bias, self.known.scale].map(|deviation| (0.0, deviation * deviation));
+        self.begin();
+    }
+
+    fn begin(&mut self) {
+        // The target may be as far from the anchors as it was.
+        if let Some(found) = self.estimate(false) {
+            let (spread, middle) = (self.known.anchors_spread, Vector3::from(self.known.middle));
+            let far = (found.position - middle).xy().norm();
+            self.known.spreads[..2].fill(far.clamp(spread, FARTHEST * spread));
+        }
+        self.hypotheses.clear();
+        self.tried = 0;
+        if self.travel != Travel::Full {
+            self.collected.clear();
+        }
+    }
+}
