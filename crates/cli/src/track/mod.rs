@@ -9,8 +9,10 @@
 //! | `settings` | what options and first rows say |
 //! | `first` | values of the first rows |
 //! | `found` | what is found from the first rows |
+//! | `later` | the same again while rows come |
 //! | `hints` | what the first rows suggest that no option says |
 //! | `doubts` | what the values say against the stated noise |
+//! | `transform` | roots and logarithms of values |
 //! | `stuck` | sensors that repeat one value |
 //! | `limits` | detection limits |
 //! | `late` | rows that come late |
@@ -37,6 +39,7 @@ mod held;
 mod hints;
 mod instant;
 mod late;
+mod later;
 mod level;
 mod limits;
 mod meaning;
@@ -53,7 +56,10 @@ mod settings;
 mod stuck;
 mod summary;
 mod targets;
+mod transform;
 mod world;
+
+pub(crate) use transform::Transform;
 
 use crate::Ending;
 use crate::arguments::{FitOptions, Model, RangesOptions, TrackOptions};
@@ -75,7 +81,8 @@ pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {
             options.table.by.clone_from(&instants.roles.by);
             options.accuracy_column.clone_from(&instants.roles.accuracy);
             let (options, corrections) = applied::applied(&options, &instants.names)?;
-            level::run(&options, instants.corrected(corrections))
+            transform::check(&options)?;
+            level::run(&options, instants.corrected(corrections, options.transform))
         }
     }
 }
