@@ -307,7 +307,7 @@ impl Settings {
         is_taken
     }
 
-    /// The factor of the change's variance under which the last rows are likeliest, if it is above `scale`.
+    /// The factor of the change's variance under which the last rows are likeliest, if it is above `scale` and larger noises explain them less.
     pub(super) fn raised(&self, rows: &[Instant], names: &[String], scale: f64) -> Option<f64> {
         let readings = self.readings(rows, names);
         let mut values = readings.iter().flat_map(|instant| &instant.values);
@@ -317,12 +317,21 @@ impl Settings {
             ..self.world
         };
         let supposed = self.world.change * scale.sqrt();
-        let change = Number::Unknown {
-            guess: supposed,
-            least: supposed,
+        let raised = |number: f64| Number::Unknown {
+            guess: number,
+            least: number,
+        };
+        let known = |number: &Number| match number {
+            Number::Known(number) | Number::Unknown { guess: number, .. } => *number,
         };
         let (_, noises) = self.numbers(names, None);
-        let found = world.calibrate(&readings, change, supposed, &noises).ok()?;
+        let found = world.calibrate(&readings, raised(supposed), supposed, &noises).ok()?;
+        // A noise that has become larger loses the level too.
+        let noisier: Vec<Number> = noises.iter().map(|noise| raised(known(noise))).collect();
+        let other = world.calibrate(&readings, Number::Known(supposed), supposed, &noisier);
+        if other.is_ok_and(|other| other.log_likelihood > found.log_likelihood) {
+            return None;
+        }
         (found.change > supposed).then(|| (found.change / self.world.change).powi(2))
     }
 

@@ -26,6 +26,8 @@ const FEWEST_ROWS: usize = 10;
 const EMPTY: f64 = 0.5;
 /// The longest interval between values in shortest ones, where values come when they have changed.
 const IRREGULAR: f64 = 3.0;
+/// Values of a sensor from which it is told whether its noise grows, at most.
+const MOST_VALUES: usize = 2000;
 /// Stretches of values that are compared, and how many times as much values of one scatter as those of another.
 const STRETCHES: usize = 8;
 const UNSTEADY: f64 = 4.0;
@@ -114,21 +116,13 @@ pub(super) fn hints(
     lines
 }
 
-/// Sensors whose noise grows with their values, or with time.
-pub(super) fn growing(options: &TrackOptions, rows: &[Instant], names: &[String]) -> Vec<String> {
-    if options.transform.is_some() || options.period.is_some() || options.accuracy_column.is_some() {
-        return Vec::new();
-    }
-    let line = |(sensor, name): (usize, &String)| {
-        let values = values_of(rows, sensor);
-        let told = unsteady(&values, name);
-        let transform = Transform::suggested(&values).filter(|transform| {
-            let transformed: Vec<f64> = values.iter().map(|value| transform.of(*value)).collect();
-            unsteady(&transformed, name).is_none()
-        });
-        transform.map_or(told, |transform| Some(transform.hint(name)))
-    };
-    names.iter().enumerate().filter_map(line).collect()
+/// What a sensor's noise grows with, if it does.
+pub(super) fn growth(values: &[f64], name: &str) -> Option<String> {
+    let transform = Transform::suggested(values).filter(|transform| {
+        let transformed: Vec<f64> = values.iter().map(|value| transform.of(*value)).collect();
+        unsteady(&transformed, name).is_none()
+    });
+    transform.map_or_else(|| unsteady(values, name), |transform| Some(transform.hint(name)))
 }
 
 /// Stretches in which values scatter far more than in others. Second differences hardly depend on a level that moves slowly.
@@ -153,7 +147,7 @@ fn unsteady(values: &[f64], name: &str) -> Option<String> {
         let from = |stretch: usize| stretch * length + 1;
         format!(
             "{name} scatters {} times as much from its value {} on as from its value {}: one noise and one change fit not both, and bands are too narrow \
-             or too wide; track parts by themselves, or say what each value's noise is (--accuracy-column)",
+             or too wide; take parts by themselves, or say what each value's noise is (--accuracy-column)",
             short((most.1 / least.1).round()),
             from(most.0),
             from(least.0)
@@ -259,36 +253,45 @@ impl Turns {
     }
 }
 
-/// Looks in all rows for values that cross the ends of a period.
+/// Looks in all rows for values that cross the ends of a period, and in many for a noise that grows.
 pub(super) struct Turning {
-    is_asked: bool,
+    asks_period: bool,
+    asks_growth: bool,
     sensors: Vec<Option<Turns>>,
+    values: Vec<Vec<f64>>,
 }
 
 impl Turning {
-    pub(super) fn new(is_asked: bool) -> Self {
+    /// `period`: that of the level, if it is an angle.
+    pub(super) fn new(options: &TrackOptions, period: Option<f64>) -> Self {
+        let is_plain = !options.reports && options.transform.is_none() && period.is_none();
         Self {
-            is_asked,
+            asks_period: is_plain && options.period.is_none(),
+            asks_growth: is_plain && options.accuracy_column.is_none() && options.silent_within.is_none(),
             sensors: Vec::new(),
+            values: Vec::new(),
         }
     }
 
     pub(super) fn add(&mut self, instant: &Instant) {
-        if !self.is_asked {
-            return;
-        }
         for (sensor, cell) in &instant.reports {
             let Some(value) = cell.filter(|cell| cell.is_finite()) else {
                 continue;
             };
             if self.sensors.len() <= *sensor {
                 self.sensors.resize(sensor + 1, None);
+                self.values.resize(sensor + 1, Vec::new());
             }
-            self.sensors[*sensor].get_or_insert(Turns::new(value)).add(value);
+            if self.asks_period {
+                self.sensors[*sensor].get_or_insert(Turns::new(value)).add(value);
+            }
+            if self.asks_growth && self.values[*sensor].len() < MOST_VALUES {
+                self.values[*sensor].push(value);
+            }
         }
     }
 
-    /// A line for each sensor that turns.
+    /// A line for each sensor that turns, and for each of which the noise grows.
     pub(super) fn hints(&self, names: &[String]) -> Vec<String> {
         let of = |(turns, name): (&Option<Turns>, &String)| {
             let period = turns.as_ref()?.period()?;
@@ -296,7 +299,13 @@ impl Turning {
                 "{name} jumps by nearly {period} and back: if it is an angle, say --period {period}; without it these estimates are wrong"
             ))
         };
-        self.sensors.iter().zip(names).filter_map(of).collect()
+        let turning = self.sensors.iter().zip(names).filter_map(of);
+        let growing = self
+            .values
+            .iter()
+            .zip(names)
+            .filter_map(|(values, name)| growth(values, name));
+        turning.chain(growing).collect()
     }
 }
 

@@ -310,9 +310,7 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
         coordinates: parts.len(),
     };
     let value = |number: f64| options.transform.map_or(number, |transform| transform.inverse(number));
-    let mut turning = Turning::new(
-        options.transform.is_none() && settings.world.period.is_none() && options.period.is_none() && !options.reports,
-    );
+    let mut turning = Turning::new(options, settings.world.period);
     let mut stuck = (!options.reports && options.silent_within.is_none()).then(Stuck::default);
     let mut run = Run::new(options, settings, &instants)?;
     let mut sheet = Sheet::new(options.output.as_deref(), Shape::of(options.json), names.collect())?;

@@ -1,7 +1,7 @@
 //! Settings of the level and its sensors, from options and first rows.
 
 use super::first::{held_values, values, values_in, values_of};
-use super::hints::{circle, growing, hints};
+use super::hints::{circle, hints};
 use super::instant::Instant;
 use super::later::Later;
 use super::limits::{self, limits};
@@ -135,7 +135,7 @@ impl Settings {
             return Err(Error::empty(instants.file(), "rows"));
         }
         // From a file that is there as a whole, more rows can be read.
-        let more: Vec<Instant> = if known || instants.is_live() {
+        let more: Vec<Instant> = if instants.is_live() {
             first.clone()
         } else {
             instants
@@ -145,8 +145,9 @@ impl Settings {
                 .cloned()
                 .collect()
         };
+        let looked_at = if known { &first } else { &more };
         let sensors = instants.names.len();
-        let has_negative = (0..sensors).any(|sensor| values_of(&more, sensor).iter().any(|value| *value < 0.0));
+        let has_negative = (0..sensors).any(|sensor| values_of(looked_at, sensor).iter().any(|value| *value < 0.0));
         let mut told = instants.roles.told.clone();
         told.extend(held.iter().map(|sensor| {
             format!(
@@ -160,7 +161,7 @@ impl Settings {
             Some(text) => Some(above_zero("--period", text, "a period above 0, as 360, or `no`")?),
             None if options.reports || options.transform.is_some() => None,
             None => (0..sensors).find_map(|sensor| {
-                let period = circle(&values_of(&more, sensor))?;
+                let period = circle(&values_of(looked_at, sensor))?;
                 let name = &instants.names[sensor];
                 told.push(format!(
                     "{name} goes around a circle of {period}: it is taken for an angle, as --period {period} says; --period no takes it for a number"
@@ -196,7 +197,7 @@ impl Settings {
                 Vec::new()
             } else {
                 (0..sensors)
-                    .map(|sensor| limits::found(&values_of(&more, sensor), &instants.names[sensor], &mut told))
+                    .map(|sensor| limits::found(&values_of(looked_at, sensor), &instants.names[sensor], &mut told))
                     .collect()
             };
         let mut settings = Self {
@@ -332,11 +333,9 @@ impl Settings {
             settings.world.zero = shift_deviation(&first, &weights, period);
         }
         let is_stated = asked_noise.is_some() || !options.noise.is_empty();
-        if !options.reports && !settings.world.is_on_grid && !instants.is_live() && !instants.has_samples() {
-            if is_stated {
-                settings.hints.extend(settings.doubts(&more, &instants.names));
-            }
-            settings.hints.extend(growing(options, &more, &instants.names));
+        if is_stated && !options.reports && !settings.world.is_on_grid && !instants.is_live() && !instants.has_samples()
+        {
+            settings.hints.extend(settings.doubts(&more, &instants.names));
         }
         let found = hints(options, &first, &instants.names, apart, settings.has_slope);
         settings.hints.extend(found);

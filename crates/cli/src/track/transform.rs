@@ -129,11 +129,11 @@ impl Transform {
     pub(super) fn hint(self, name: &str) -> String {
         match self {
             Self::Root => format!(
-                "the noise of {name} grows as the root of its values, as that of counts does: --transform root says so; without it bands are too narrow \
+                "the noise of {name} grows as the root of its values, as that of counts does: `track --transform root` says so; without it bands are too narrow \
                  where values are large"
             ),
             Self::Log => format!(
-                "the noise of {name} grows in proportion to its values: --transform log says so; without it bands are too narrow where values are large"
+                "the noise of {name} grows in proportion to its values: `track --transform log` says so; without it bands are too narrow where values are large"
             ),
         }
     }
