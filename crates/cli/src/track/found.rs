@@ -2,6 +2,7 @@
 
 use super::first::{steepest, values, values_of};
 use super::instant::{Instant, Qualifier};
+use super::later::Unknown;
 use super::meaning::Seat;
 use super::settings::Settings;
 use super::world::World;
@@ -43,13 +44,6 @@ fn refused(source: fewbits_filters::Error) -> Error {
         what: "change and noise cannot be found",
         source: source.into(),
     }
-}
-
-/// What is found from the first rows, and the deviation of rounding, which a noise is not below.
-pub(super) struct Unknown {
-    pub(super) change: bool,
-    pub(super) noise: bool,
-    floor: f64,
 }
 
 impl Settings {

@@ -1,13 +1,17 @@
 //! Change and noise found again while rows come: the first rows hardly tell a small change, and a level that rests in them may move later.
 
-use super::found::Unknown;
 use super::instant::Instant;
-use super::settings::Settings;
-use crate::arguments::Model;
 use std::collections::VecDeque;
 
 /// Last rows from which the change is found if the level is lost.
 const LAST: usize = 32;
+
+/// What is found from the first rows, and the deviation of rounding, which a noise is not below.
+pub(super) struct Unknown {
+    pub(super) change: bool,
+    pub(super) noise: bool,
+    pub(super) floor: f64,
+}
 
 /// Rows of a stream from which numbers are found again and again, each time from twice as many.
 pub(super) struct Later {
@@ -39,8 +43,13 @@ impl Later {
         self.next > self.most
     }
 
-    /// Adds an instant. If it is time, finds numbers again, and returns all rows where they differ from those before.
-    pub(super) fn add(&mut self, instant: &Instant, names: &[String], settings: &mut Settings) -> Option<&[Instant]> {
+    /// What is found, and from how many rows it was found first.
+    pub(super) fn unknown(&self) -> (&Unknown, usize) {
+        (&self.unknown, self.first)
+    }
+
+    /// Adds an instant. All so far, if it is time to find numbers again.
+    pub(super) fn add(&mut self, instant: &Instant) -> Option<&[Instant]> {
         self.rows.push(instant.clone());
         if self.rows.len() < self.next {
             return None;
@@ -50,10 +59,7 @@ impl Later {
         } else {
             usize::MAX
         };
-        let first = &self.rows[..self.first];
-        settings
-            .refine((first, &self.rows), names, &self.unknown)
-            .then_some(self.rows.as_slice())
+        Some(&self.rows)
     }
 }
 
@@ -64,14 +70,12 @@ pub(super) struct Last {
 }
 
 impl Last {
-    /// `None` if the change is not learnt from values, or is no standard deviation of steps. `reports`: rows in which
-    /// each sensor reports once.
-    pub(super) fn new(settings: &Settings, has_bits: bool, reports: usize) -> Option<Self> {
-        let is_found = settings.world.is_learning && settings.world.model != Model::Returning && !has_bits;
-        is_found.then(|| Self {
+    /// `reports`: rows in which each sensor reports once.
+    pub(super) fn new(reports: usize) -> Self {
+        Self {
             rows: VecDeque::new(),
             most: LAST * reports,
-        })
+        }
     }
 
     /// Adds a row; `is_used`: whether a sensor's values count.
@@ -86,8 +90,7 @@ impl Last {
         }
     }
 
-    /// The factor of the change's variance after the level was lost, if it is above `scale`.
-    pub(super) fn scale(&mut self, settings: &Settings, names: &[String], scale: f64) -> Option<f64> {
-        settings.raised(self.rows.make_contiguous(), names, scale)
+    pub(super) fn rows(&mut self) -> &[Instant] {
+        self.rows.make_contiguous()
     }
 }

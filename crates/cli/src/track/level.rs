@@ -65,11 +65,12 @@ impl Run {
             centre: centre(&settings.world, purpose).map_err(refused)?,
             full: full.map_err(refused)?,
             file: instants.file().to_owned(),
-            last: Last::new(
-                &settings,
-                options.reports || is_quantized,
-                options.table.by.as_ref().map_or(1, |_| instants.names.len().max(1)),
-            ),
+            // A level that returns has no standard deviation of steps.
+            last: (settings.world.is_learning
+                && settings.world.model != Model::Returning
+                && !options.reports
+                && !is_quantized)
+                .then(|| Last::new(options.table.by.as_ref().map_or(1, |_| instants.names.len().max(1)))),
             squares: 0.0,
             summary: Summary {
                 rows: 0,
@@ -113,7 +114,8 @@ impl Run {
         let Some(mut later) = self.settings.later.take() else {
             return Ok(());
         };
-        if let Some(rows) = later.add(instant, names, &mut self.settings) {
+        let (rows, (unknown, first)) = (later.add(instant).map(<[_]>::to_vec), later.unknown());
+        if let Some(rows) = rows.filter(|rows| self.settings.refine((&rows[..first], rows), names, unknown)) {
             let refused = |source: Failure| Error::Refused {
                 what: "the model is refused",
                 source,
@@ -173,7 +175,7 @@ impl Run {
         if let Some(last) = &mut self.last {
             last.add(instant, |sensor| self.centre.health(sensor).1);
             if step.events.iter().any(|(event, _)| *event == "lost")
-                && let Some(scale) = last.scale(&self.settings, names, step.noise_scale)
+                && let Some(scale) = self.settings.raised(last.rows(), names, step.noise_scale)
             {
                 self.centre.rescale(scale).map_err(refused)?;
             }

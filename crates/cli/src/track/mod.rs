@@ -81,10 +81,28 @@ pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {
             options.table.by.clone_from(&instants.roles.by);
             options.accuracy_column.clone_from(&instants.roles.accuracy);
             let (options, corrections) = applied::applied(&options, &instants.names)?;
-            transform::check(&options)?;
+            check_transform(&options)?;
             level::run(&options, instants.corrected(corrections, options.transform))
         }
     }
+}
+
+/// Refuses options that a transform does not go with.
+fn check_transform(options: &TrackOptions) -> Result<(), Error> {
+    let has_slope = matches!(options.model, Some(Model::Velocity | Model::Acceleration));
+    let reason = match (options.transform, has_slope, &options.accuracy_column) {
+        (Some(_), true, _) => {
+            "with --transform the model is that of a level: `walk` or `returning` is expected, or --model left out"
+        }
+        (Some(_), _, Some(_)) => {
+            "accuracies are those of values, not of what --transform makes of them: name the sensors by --columns"
+        }
+        _ => return Ok(()),
+    };
+    Err(Error::Needed {
+        option: if has_slope { "--model walk" } else { "--columns" },
+        reason,
+    })
 }
 
 /// Runs the task `fit`.

@@ -6,8 +6,6 @@
 //! ```
 
 use super::instant::Reports;
-use crate::arguments::{Model, TrackOptions};
-use crate::error::Error;
 use clap::ValueEnum;
 
 /// Triples of values from which it is told whether the noise grows, at least.
@@ -30,24 +28,6 @@ pub(crate) enum Transform {
     Root,
     /// `ln v`, for a noise in proportion to the value.
     Log,
-}
-
-/// Refuses options that a transform does not go with.
-pub(super) fn check(options: &TrackOptions) -> Result<(), Error> {
-    let has_slope = matches!(options.model, Some(Model::Velocity | Model::Acceleration));
-    let reason = match (options.transform, has_slope, &options.accuracy_column) {
-        (Some(_), true, _) => {
-            "with --transform the model is that of a level: `walk` or `returning` is expected, or --model left out"
-        }
-        (Some(_), _, Some(_)) => {
-            "accuracies are those of values, not of what --transform makes of them: name the sensors by --columns"
-        }
-        _ => return Ok(()),
-    };
-    Err(Error::Needed {
-        option: if has_slope { "--model walk" } else { "--columns" },
-        reason,
-    })
 }
 
 impl Transform {
