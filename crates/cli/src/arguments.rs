@@ -295,6 +295,10 @@ pub(crate) struct TrackOptions {
     /// 360 degrees or 2 pi if the first rows jump by nearly that and back as if they went on around the circle.
     #[arg(long, value_name = "PERIOD|no")]
     pub(crate) period: Option<String>,
+    /// Track the values' roots (`root`: counts, whose noise grows as the root of the value) or logarithms (`log`: a noise in proportion to the value).
+    /// Estimates are written as values; noise, change and prior are those of `2 sqrt(v + 3/8)` and `ln v`.
+    #[arg(long, value_enum, conflicts_with_all = ["accuracy_column", "limits", "period", "reports", "rounded", "settings", "silent_within", "threshold_column"])]
+    pub(crate) transform: Option<crate::track::Transform>,
     /// Subtract from each sensor its offset, found from this many first rows. The median of all offsets is zero. Default: no correction.
     #[arg(long, value_name = "ROWS")]
     pub(crate) align: Option<usize>,

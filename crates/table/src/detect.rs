@@ -5,7 +5,7 @@ use crate::dialect::{Delimiter, Dialect};
 use crate::error::{Error, Place};
 use crate::head::Head;
 use crate::lines::{MAX_ROW_LINES, Split};
-use crate::{guess, known, marks, missing, number};
+use crate::{guess, known, limits, marks, missing, number};
 
 /// What a cell looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,8 +23,10 @@ fn look(cell: &str, decimal_comma: bool) -> Look {
     };
     if missing::is_usual(cell, true) {
         Look::Missing
-    } else if number::read(cell.as_bytes(), syntax) != Err(number::Fault::NoNumber) {
-        // A number that no double holds is one all the same: not a name, and refused when it is read.
+    } else if number::read(cell.as_bytes(), syntax) != Err(number::Fault::NoNumber)
+        || limits::parse(cell, syntax).is_some()
+    {
+        // A number that no double holds is one all the same, not a name, and refused when it is read; as is a limit, `<0.25`.
         Look::Number
     } else if guess::looks_like_time(cell) {
         Look::Time

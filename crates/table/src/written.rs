@@ -218,10 +218,11 @@ impl Clock {
         let text: &str = &self.without_groups(text)?;
         match number(text, unit) {
             Err(problem) if problem == TOO_FINE && self.cuts => {
-                // What is cut is less than a nanosecond.
+                // What is cut is less than a nanosecond. The last digits before an exponent are not the last decimals.
                 let places = usize::from(DECIMALS - unit.decimals());
                 let end = text
                     .find(['.', ','])
+                    .filter(|_| !text.contains(['e', 'E']))
                     .map_or(text.len(), |i| (i + 1 + places).min(text.len()));
                 number(text.get(..end).unwrap_or(text), unit).or_else(|_| {
                     let value: f64 = text.parse().map_err(|_| NO_TIME)?;

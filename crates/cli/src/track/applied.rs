@@ -1,5 +1,6 @@
 //! What `fit` found, as a file, and as settings of `track`.
 
+use super::instant::Reports;
 use crate::arguments::{Model, TrackOptions};
 use crate::error::Error;
 use crate::say::say;
@@ -46,8 +47,18 @@ pub(super) struct Correction {
 
 impl Correction {
     /// The value of a sensor without faults.
-    pub(super) fn of(&self, value: f64, seconds: f64) -> f64 {
+    fn of(&self, value: f64, seconds: f64) -> f64 {
         (value - self.bias - self.slope * seconds) / self.gain
+    }
+}
+
+/// Corrects the values of the sensors that have a correction.
+pub(super) fn correct(corrections: &[Correction], reports: &mut Reports, names: &[String], seconds: f64) {
+    for (sensor, cell) in reports {
+        let correction = corrections.iter().find(|one| Some(&one.name) == names.get(*sensor));
+        if let (Some(correction), Some(value)) = (correction, cell) {
+            *value = correction.of(*value, seconds);
+        }
     }
 }
 

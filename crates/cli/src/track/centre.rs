@@ -29,6 +29,8 @@ const ALARMS: FalseAlarms = FalseAlarms {
 };
 /// Step of the learnt change for one sensor. The change that is found from the first rows is accurate already, so it is small.
 const LEARNING: f64 = 0.01;
+/// Smallest and largest factor of the change's variance: a level may rest while it is found, and then move.
+const LEARNT: [f64; 2] = [1e-3, 1e6];
 /// Bits of a value.
 const VALUE_BITS: usize = 64;
 
@@ -55,6 +57,8 @@ pub(super) trait Estimator {
     fn seated(&self) -> usize;
     /// Processes one instant.
     fn step(&mut self, instant: &Instant) -> Result<Step, Failure>;
+    /// Sets the factor of the change's variance.
+    fn rescale(&mut self, scale: f64) -> Result<(), Failure>;
     /// Probability that a sensor works, and whether its reports are used.
     fn health(&self, sensor: usize) -> (f64, bool);
     /// Number of its reports that were rejected.
@@ -170,7 +174,7 @@ impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
             let learning = NoiseLearning {
                 // Every sensor adds a term in each row, and they do not depend on each other.
                 gain: LEARNING / (world.sensors.max(1) as f64).sqrt(),
-                ..NoiseLearning::DEFAULT
+                range: LEARNT,
             };
             centre = centre.learning_noise(learning)?;
         }
@@ -310,6 +314,10 @@ impl<const D: usize, F: StateFilter<D>> Estimator for Centre<D, F> {
             used: (0..self.members.len()).filter(|sensor| self.health(*sensor).1).count(),
             noise_scale: self.centre.noise_scale(),
         })
+    }
+
+    fn rescale(&mut self, scale: f64) -> Result<(), Failure> {
+        Ok(self.centre.set_noise_scale(scale)?)
     }
 
     fn health(&self, sensor: usize) -> (f64, bool) {

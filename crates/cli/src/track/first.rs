@@ -2,6 +2,7 @@
 
 use super::instant::Instant;
 use fewbits_filters::calibration::{self, median, wrapped};
+use std::collections::BTreeMap;
 
 /// The deviation of an unknown slope in multiples of the slopes between values that are an eighth of the first rows apart.
 const STEEP: f64 = 3.0;
@@ -31,6 +32,17 @@ pub(super) fn values(first: &[Instant], offsets: &[f64]) -> Vec<calibration::Ins
     first.iter().map(of).collect()
 }
 
+/// The same of sensors that send on change, each with its last value until the next: otherwise they hardly ever have values at one time.
+pub(super) fn held_values(first: &[Instant]) -> Vec<calibration::Instant> {
+    let mut held = BTreeMap::new();
+    let of = |mut instant: calibration::Instant| {
+        held.extend(instant.values.iter().copied());
+        instant.values = held.iter().map(|(sensor, reading)| (*sensor, *reading)).collect();
+        instant
+    };
+    values(first, &[]).into_iter().map(of).collect()
+}
+
 /// A deviation for the slope per second before the first row: what the first rows do over an eighth of their length.
 pub(super) fn steepest(first: &[calibration::Instant], sensors: usize, period: Option<f64>) -> f64 {
     let of = |sensor: usize| {
@@ -49,4 +61,20 @@ pub(super) fn steepest(first: &[calibration::Instant], sensors: usize, period: O
             .collect::<Vec<f64>>()
     };
     STEEP * median((0..sensors).flat_map(of).collect())
+}
+
+/// Number of values of the sensor with the most of them.
+pub(super) fn values_in<'a>(first: impl IntoIterator<Item = &'a Instant>) -> usize {
+    let mut counts: Vec<usize> = Vec::new();
+    for (sensor, _) in first
+        .into_iter()
+        .flat_map(|instant| &instant.reports)
+        .filter(|(_, cell)| cell.is_some_and(f64::is_finite))
+    {
+        if counts.len() <= *sensor {
+            counts.resize(sensor + 1, 0);
+        }
+        counts[*sensor] += 1;
+    }
+    counts.into_iter().max().unwrap_or(0)
 }

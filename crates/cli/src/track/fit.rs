@@ -3,6 +3,7 @@
 use super::applied::{Found, Sensor};
 use super::columns::Kind;
 use super::first::values_of;
+use super::hints::{circle, growth};
 use super::instant::{Instant, Qualifier};
 use super::rows::Instants;
 use super::stuck::Stuck;
@@ -94,6 +95,18 @@ pub(crate) fn run(options: &FitOptions) -> Result<Ending, Error> {
         }
     }
     stuck.hints(&names).iter().for_each(|line| say!("{line}"));
+    for (sensor, name) in names.iter().enumerate().filter(|(sensor, _)| !bits.contains(sensor)) {
+        let values = values_of(&rows, sensor);
+        if let Some(period) = circle(&values) {
+            say!(
+                "{name} goes around a circle of {period}, which is not calibrated here: a step across its ends counts as a jump of the level"
+            );
+        } else {
+            growth(&values, name)
+                .iter()
+                .for_each(|line| say!("{line}; here the noise is a mean over all values"));
+        }
+    }
     Ok(Ending::Good)
 }
 

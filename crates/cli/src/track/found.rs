@@ -2,6 +2,7 @@
 
 use super::first::{steepest, values, values_of};
 use super::instant::{Instant, Qualifier};
+use super::later::Unknown;
 use super::meaning::Seat;
 use super::settings::Settings;
 use super::world::World;
@@ -33,6 +34,8 @@ const LOSS_ALONE: f64 = 5.0;
 /// Share of values beyond a limit up to which the mean and the deviation of all say those of the level.
 const MOST_CUT: f64 = 0.05;
 
+/// Deviation of the level before the last rows, in deviations of the noise.
+const WIDE: f64 = 10.0;
 /// Least guess of the change, as a share of the noise.
 const LEAST_GUESS: f64 = 0.01;
 
@@ -41,13 +44,6 @@ fn refused(source: fewbits_filters::Error) -> Error {
         what: "change and noise cannot be found",
         source: source.into(),
     }
-}
-
-/// What is found from the first rows, and the deviation of rounding, which a noise is not below.
-pub(super) struct Unknown {
-    pub(super) change: bool,
-    pub(super) noise: bool,
-    floor: f64,
 }
 
 impl Settings {
@@ -267,23 +263,23 @@ impl Settings {
     }
 
     /// Finds change and noises again from `more` rows, the first ones among them. What is found is taken if it explains the first rows nearly as
-    /// well as what was found from them alone: a sensor that fails later must not change the noise that it has before.
+    /// well as what was found from them alone: a sensor that fails later must not change the noise that it has before. Whether it is taken.
     pub(super) fn refine(
         &mut self,
         (first, more): (&[Instant], &[Instant]),
         names: &[String],
         unknown: &Unknown,
-    ) -> Result<(), Error> {
+    ) -> bool {
         let readings = self.readings(first, names);
         let explained = |settings: &Self| {
             let (change, noises) = settings.numbers(names, None);
             let found = settings
                 .world
                 .calibrate(&readings, change, settings.world.change, &noises);
-            found.map(|found| found.log_likelihood).map_err(refused)
+            found.map_or(f64::NEG_INFINITY, |found| found.log_likelihood)
         };
         let before = (self.world.change, self.noise, self.found.clone());
-        let likelihood = explained(self)?;
+        let likelihood = explained(self);
         if unknown.change {
             // First rows without a change are no guess of that of the others.
             self.world.change = self.world.change.max(LEAST_GUESS * self.noise);
@@ -291,15 +287,46 @@ impl Settings {
         let (change, noises) = self.numbers(names, Some(unknown));
         let found = self
             .world
-            .calibrate(&self.readings(more, names), change, self.world.change, &noises)
-            .map_err(refused)?;
-        self.take(found, unknown);
+            .calibrate(&self.readings(more, names), change, self.world.change, &noises);
+        let is_found = found.is_ok();
+        if let Ok(found) = found {
+            self.take(found, unknown);
+        }
         let numbers = noises.iter().chain([&change]);
         let free = numbers.filter(|one| matches!(one, Number::Unknown { .. })).count();
-        if explained(self)? < likelihood - (LOSS_ALONE + free as f64) {
+        let is_taken = is_found && explained(self) >= likelihood - (LOSS_ALONE + free as f64);
+        if !is_taken {
             (self.world.change, self.noise, self.found) = before;
         }
-        Ok(())
+        is_taken
+    }
+
+    /// The factor of the change's variance under which the last rows are likeliest, if it is above `scale` and larger noises explain them less.
+    pub(super) fn raised(&self, rows: &[Instant], names: &[String], scale: f64) -> Option<f64> {
+        let readings = self.readings(rows, names);
+        let mut values = readings.iter().flat_map(|instant| &instant.values);
+        let origin = values.find_map(|(_, reading)| reading.value())?;
+        let world = World {
+            prior: (origin, WIDE * self.noise),
+            ..self.world
+        };
+        let supposed = self.world.change * scale.sqrt();
+        let raised = |number: f64| Number::Unknown {
+            guess: number,
+            least: number,
+        };
+        let known = |number: &Number| match number {
+            Number::Known(number) | Number::Unknown { guess: number, .. } => *number,
+        };
+        let (_, noises) = self.numbers(names, None);
+        let found = world.calibrate(&readings, raised(supposed), supposed, &noises).ok()?;
+        // A noise that has become larger loses the level too.
+        let noisier: Vec<Number> = noises.iter().map(|noise| raised(known(noise))).collect();
+        let other = world.calibrate(&readings, Number::Known(supposed), supposed, &noisier);
+        if other.is_ok_and(|other| other.log_likelihood > found.log_likelihood) {
+            return None;
+        }
+        (found.change > supposed).then(|| (found.change / self.world.change).powi(2))
     }
 
     /// Sensors whose innovations in the first rows repeat, or return: each wrongly with one in a thousand tables. Only of a level that wanders, read by

@@ -1,7 +1,9 @@
 //! What the first rows of a table suggest that no option says.
 
-use super::first::{values as first_values, values_of};
+use super::first::{held_values, values as first_values, values_of};
 use super::instant::Instant;
+use super::meaning::silence;
+use super::transform::Transform;
 use crate::arguments::TrackOptions;
 use crate::numbers::short;
 use fewbits_filters::calibration::{median, offsets};
@@ -24,6 +26,11 @@ const FEWEST_ROWS: usize = 10;
 const EMPTY: f64 = 0.5;
 /// The longest interval between values in shortest ones, where values come when they have changed.
 const IRREGULAR: f64 = 3.0;
+/// Values of a sensor from which it is told whether its noise grows, at most.
+const MOST_VALUES: usize = 2000;
+/// Stretches of values that are compared, and how many times as much values of one scatter as those of another.
+const STRETCHES: usize = 8;
+const UNSTEADY: f64 = 4.0;
 /// An offset is told if it is this many of the sensor's deviations.
 const LARGE: f64 = 1.0;
 
@@ -80,7 +87,12 @@ pub(super) fn hints(
     }
     lines.extend(unheard(options, first));
     if options.align.is_none() && options.period.is_none() {
-        lines.extend(apart(first, names));
+        let width = options
+            .silent_within
+            .as_deref()
+            .and_then(|text| silence(text).ok())
+            .map(|said| said.0);
+        lines.extend(apart(first, names, width));
     }
     let large = |(sensor, offset): (usize, &f64)| offset.abs() > LARGE * noises[sensor];
     if names.len() == 2 && aligned.iter().enumerate().any(large) {
@@ -101,6 +113,45 @@ pub(super) fn hints(
     lines
 }
 
+/// What a sensor's noise grows with, if it does.
+pub(super) fn growth(values: &[f64], name: &str) -> Option<String> {
+    let transform = Transform::suggested(values).filter(|transform| {
+        let transformed: Vec<f64> = values.iter().map(|value| transform.of(*value)).collect();
+        unsteady(&transformed, name).is_none()
+    });
+    transform.map_or_else(|| unsteady(values, name), |transform| Some(transform.hint(name)))
+}
+
+/// Stretches in which values scatter far more than in others. Second differences hardly depend on a level that moves slowly.
+fn unsteady(values: &[f64], name: &str) -> Option<String> {
+    let length = values.len() / STRETCHES;
+    if length < FEWEST_BITS {
+        return None;
+    }
+    let scatter = |values: &[f64]| {
+        median(
+            values
+                .windows(3)
+                .map(|one| (one[0] - 2.0 * one[1] + one[2]).abs())
+                .collect(),
+        )
+    };
+    let stretches = values.chunks_exact(length).map(scatter).enumerate();
+    let mut all: Vec<(usize, f64)> = stretches.collect();
+    all.sort_by(|one, other| one.1.total_cmp(&other.1));
+    let (least, most) = (all.first()?, all.last()?);
+    (least.1 > 0.0 && most.1 > UNSTEADY * least.1).then(|| {
+        let from = |stretch: usize| stretch * length + 1;
+        format!(
+            "{name} scatters {} times as much from its value {} on as from its value {}: one noise and one change fit not both, and bands are too narrow \
+             or too wide; take parts by themselves, or say what each value's noise is (--accuracy-column)",
+            short((most.1 / least.1).round()),
+            from(most.0),
+            from(least.0)
+        )
+    })
+}
+
 /// Silence that is said to mean something, in a table that has none.
 fn unheard(options: &TrackOptions, first: &[Instant]) -> Option<String> {
     let said = options.silent_within.as_deref().filter(|said| !said.contains('/'))?;
@@ -115,14 +166,15 @@ fn unheard(options: &TrackOptions, first: &[Instant]) -> Option<String> {
     })
 }
 
-/// Sensors of constant offset from the others.
-fn apart(first: &[Instant], names: &[String]) -> Option<String> {
-    let found = offsets(&first_values(first, &[]), names.len(), None);
+/// Sensors of constant offset from the others. `width`: that of silence.
+fn apart(first: &[Instant], names: &[String], width: Option<f64>) -> Option<String> {
+    let values = width.map_or_else(|| first_values(first, &[]), |_| held_values(first));
+    let found = offsets(&values, names.len(), None);
     let is_apart = |sensor: &usize| {
         let values = values_of(first, *sensor);
         let steps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
-        // Of the difference of two values, by its median.
-        let deviation = median(steps) / (0.6745 * std::f64::consts::SQRT_2);
+        // Of the difference of two values, by its median; of a value that is held, by the width.
+        let deviation = width.map_or_else(|| median(steps) / (0.6745 * std::f64::consts::SQRT_2), |width| 0.5 * width);
         values.len() >= FEWEST_ROWS && found[*sensor].abs() > LARGE * deviation
     };
     let apart: Vec<String> = (0..names.len())
@@ -198,36 +250,45 @@ impl Turns {
     }
 }
 
-/// Looks in all rows for values that cross the ends of a period.
+/// Looks in all rows for values that cross the ends of a period, and in many for a noise that grows.
 pub(super) struct Turning {
-    is_asked: bool,
+    asks_period: bool,
+    asks_growth: bool,
     sensors: Vec<Option<Turns>>,
+    values: Vec<Vec<f64>>,
 }
 
 impl Turning {
-    pub(super) fn new(is_asked: bool) -> Self {
+    /// `period`: that of the level, if it is an angle.
+    pub(super) fn new(options: &TrackOptions, period: Option<f64>) -> Self {
+        let is_plain = !options.reports && options.transform.is_none() && period.is_none();
         Self {
-            is_asked,
+            asks_period: is_plain && options.period.is_none(),
+            asks_growth: is_plain && options.accuracy_column.is_none() && options.silent_within.is_none(),
             sensors: Vec::new(),
+            values: Vec::new(),
         }
     }
 
     pub(super) fn add(&mut self, instant: &Instant) {
-        if !self.is_asked {
-            return;
-        }
         for (sensor, cell) in &instant.reports {
             let Some(value) = cell.filter(|cell| cell.is_finite()) else {
                 continue;
             };
             if self.sensors.len() <= *sensor {
                 self.sensors.resize(sensor + 1, None);
+                self.values.resize(sensor + 1, Vec::new());
             }
-            self.sensors[*sensor].get_or_insert(Turns::new(value)).add(value);
+            if self.asks_period {
+                self.sensors[*sensor].get_or_insert(Turns::new(value)).add(value);
+            }
+            if self.asks_growth && self.values[*sensor].len() < MOST_VALUES {
+                self.values[*sensor].push(value);
+            }
         }
     }
 
-    /// A line for each sensor that turns.
+    /// A line for each sensor that turns, and for each of which the noise grows.
     pub(super) fn hints(&self, names: &[String]) -> Vec<String> {
         let of = |(turns, name): (&Option<Turns>, &String)| {
             let period = turns.as_ref()?.period()?;
@@ -235,7 +296,13 @@ impl Turning {
                 "{name} jumps by nearly {period} and back: if it is an angle, say --period {period}; without it these estimates are wrong"
             ))
         };
-        self.sensors.iter().zip(names).filter_map(of).collect()
+        let turning = self.sensors.iter().zip(names).filter_map(of);
+        let growing = self
+            .values
+            .iter()
+            .zip(names)
+            .filter_map(|(values, name)| growth(values, name));
+        turning.chain(growing).collect()
     }
 }
 

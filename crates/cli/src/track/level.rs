@@ -3,7 +3,9 @@
 use super::centre::{Estimator, Step, Use, centre};
 use super::hints::Turning;
 use super::instant::Instant;
-use super::report::{BAND, cells, first_cell, first_name, summarise};
+use super::later::Last;
+use super::meaning::Seat;
+use super::report::{BAND, Shown, cells, first_cell, first_name, summarise};
 use super::rhythm::Rhythm;
 use super::rows::Instants;
 use super::settings::Settings;
@@ -31,9 +33,12 @@ type Happened = (&'static str, Option<usize>);
 struct Run {
     settings: Settings,
     file: String,
+    purpose: Use,
     centre: Box<dyn Estimator>,
     /// The same sensors without quantization.
     full: Option<Box<dyn Estimator>>,
+    /// The last rows, from which the change is found if the level is lost.
+    last: Option<Last>,
     squares: f64,
     summary: Summary,
     path: Thinned<Picked>,
@@ -56,9 +61,16 @@ impl Run {
             .then(|| centre(&settings.world, Use::Comparison))
             .transpose();
         Ok(Self {
+            purpose,
             centre: centre(&settings.world, purpose).map_err(refused)?,
             full: full.map_err(refused)?,
             file: instants.file().to_owned(),
+            // A level that returns has no standard deviation of steps.
+            last: (settings.world.is_learning
+                && settings.world.model != Model::Returning
+                && !options.reports
+                && !is_quantized)
+                .then(|| Last::new(options.table.by.as_ref().map_or(1, |_| instants.names.len().max(1)))),
             squares: 0.0,
             summary: Summary {
                 rows: 0,
@@ -83,7 +95,7 @@ impl Run {
     }
 
     /// Processes an instant without a row; its events.
-    fn between(&mut self, instant: &Instant) -> Result<Vec<Happened>, Error> {
+    fn between(&mut self, instant: &Instant, names: &[String]) -> Result<Vec<Happened>, Error> {
         let refused = |source: Failure| Error::Row {
             file: self.file.clone(),
             row: instant.row,
@@ -92,7 +104,45 @@ impl Run {
         if let Some(full) = &mut self.full {
             full.step(instant).map_err(refused)?;
         }
-        Ok(self.centre.step(instant).map_err(refused)?.events)
+        let events = self.centre.step(instant).map_err(refused)?.events;
+        self.learn(instant, names)?;
+        Ok(events)
+    }
+
+    /// Finds change and noise again if enough rows have come. All rows so far are then gone through anew.
+    fn learn(&mut self, instant: &Instant, names: &[String]) -> Result<(), Error> {
+        let Some(mut later) = self.settings.later.take() else {
+            return Ok(());
+        };
+        let (rows, (unknown, first)) = (later.add(instant).map(<[_]>::to_vec), later.unknown());
+        if let Some(rows) = rows.filter(|rows| self.settings.refine((&rows[..first], rows), names, unknown)) {
+            let refused = |source: Failure| Error::Refused {
+                what: "the model is refused",
+                source,
+            };
+            let seats: Vec<Seat> = names[..self.centre.seated()]
+                .iter()
+                .enumerate()
+                .map(|(sensor, name)| self.settings.seat(sensor, name))
+                .collect();
+            let again = |purpose: Use| {
+                let mut centre = centre(&self.settings.world, purpose)?;
+                seats.iter().try_for_each(|seat| centre.join(seat.clone()))?;
+                rows.iter().try_for_each(|row| centre.step(row).map(|_| ()))?;
+                Ok(centre)
+            };
+            self.centre = again(self.purpose).map_err(refused)?;
+            if self.full.is_some() {
+                self.full = Some(again(Use::Comparison).map_err(refused)?);
+            }
+            self.summary.noise = self.settings.noise;
+            self.summary.change = self.settings.world.change;
+            for (sensor, seat) in self.summary.sensors.iter_mut().zip(&seats) {
+                sensor.noise = seat.noise;
+            }
+        }
+        self.settings.later = Some(later).filter(|later| !later.is_done());
+        Ok(())
     }
 
     /// Processes a row, whose events come after those `before`.
@@ -122,6 +172,14 @@ impl Run {
             });
         }
         let mut step = self.centre.step(instant).map_err(refused)?;
+        if let Some(last) = &mut self.last {
+            last.add(instant, |sensor| self.centre.health(sensor).1);
+            if step.events.iter().any(|(event, _)| *event == "lost")
+                && let Some(scale) = self.settings.raised(last.rows(), names, step.noise_scale)
+            {
+                self.centre.rescale(scale).map_err(refused)?;
+            }
+        }
         step.events.splice(0..0, before);
         let full = self
             .full
@@ -156,6 +214,7 @@ impl Run {
             estimate: step.estimate[0],
             full,
         });
+        self.learn(instant, names)?;
         Ok(step)
     }
 
@@ -169,8 +228,9 @@ impl Run {
             sensor.surprise = self.centre.surprise(number);
         }
         let points = self.path.points();
+        let value = |number: f64| options.transform.map_or(number, |transform| transform.inverse(number));
         let edge = |sign: f64| {
-            let at = |picked: &Picked| (picked.seconds, picked.estimate.0 + sign * BAND * picked.estimate.1);
+            let at = |picked: &Picked| (picked.seconds, value(picked.estimate.0 + sign * BAND * picked.estimate.1));
             points.iter().map(at).collect::<Vec<_>>()
         };
         let mut layers = vec![
@@ -191,13 +251,16 @@ impl Run {
         ];
         if self.full.is_some() {
             layers.push(Layer::Line {
-                points: points.iter().filter_map(|p| Some((p.seconds, p.full?))).collect(),
+                points: points
+                    .iter()
+                    .filter_map(|p| Some((p.seconds, value(p.full?))))
+                    .collect(),
                 colour: 1,
                 name: "estimate from values in full".to_owned(),
             });
         }
         layers.push(Layer::Line {
-            points: points.iter().map(|p| (p.seconds, p.estimate.0)).collect(),
+            points: points.iter().map(|p| (p.seconds, value(p.estimate.0))).collect(),
             colour: 0,
             name: "estimate, band of 95 %".to_owned(),
         });
@@ -246,8 +309,13 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
     let names = std::iter::once(first_name(&instants).to_owned())
         .chain(columns)
         .chain(last);
-    let shown = (settings.circle, parts.len());
-    let mut turning = Turning::new(settings.world.period.is_none() && options.period.is_none() && !options.reports);
+    let shown = Shown {
+        circle: settings.circle,
+        transform: options.transform,
+        coordinates: parts.len(),
+    };
+    let value = |number: f64| options.transform.map_or(number, |transform| transform.inverse(number));
+    let mut turning = Turning::new(options, settings.world.period);
     let mut stuck = (!options.reports && options.silent_within.is_none()).then(Stuck::default);
     let mut run = Run::new(options, settings, &instants)?;
     let mut sheet = Sheet::new(options.output.as_deref(), Shape::of(options.json), names.collect())?;
@@ -265,7 +333,7 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
     let (mut waiting, mut between) = (Vec::new(), Vec::new());
     while let Some(mut instant) = instants.next()? {
         if !instant.is_row {
-            between.extend(run.between(&instant)?);
+            between.extend(run.between(&instant, &instants.names)?);
             // It has no row of its own.
             if lag.is_some() {
                 waiting.push(None);
@@ -286,7 +354,7 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
                 .iter()
                 .filter_map(|(_, cell)| *cell)
                 .filter(|cell| cell.is_finite());
-            values.for_each(|value| run.measured.push((instant.seconds, value)));
+            values.for_each(|number| run.measured.push((instant.seconds, value(number))));
         }
         let first = first_cell(&instants, instant.time.clone());
         let events = text(&step, &instants.names);

@@ -11,6 +11,8 @@ pub(super) type Ends = (Option<f64>, Option<f64>);
 const FEWEST: usize = 30;
 const SHARE: usize = 20;
 const MORE: usize = 5;
+/// A number far from all others that marks gaps is there so many times at least.
+const FEWEST_MARKS: usize = 3;
 /// Beside it, values hardly ever repeat: at least this share of them are different.
 const DIFFERENT: f64 = 0.5;
 /// It is at most this share of the others' range away from them.
@@ -51,9 +53,11 @@ pub(super) fn found(values: &[f64], name: &str, told: &mut Vec<String>) -> Ends 
     let is_various = inner.len() as f64 >= DIFFERENT * count as f64;
     let reach = NEAR * (inner[inner.len() - 1][0] - inner[0][0]);
     let is_limit = |run: &[f64]| is_various && run.len() * SHARE >= values.len() && run.len() > MORE * most.max(1);
+    // Of values that mark gaps a few suffice.
+    let is_mark = |run: &[f64], gap: f64| is_various && gap > 2.0 * reach && run.len() >= FEWEST_MARKS.max(most + 1);
     let mut end = |run: &[f64], gap: f64, option: &dyn Fn(f64) -> String| {
         let (at, many) = (run[0], run.len());
-        if !is_limit(run) {
+        if !is_limit(run) && !is_mark(run, gap) {
             return None;
         }
         if gap > reach {

@@ -9,8 +9,10 @@
 //! | `settings` | what options and first rows say |
 //! | `first` | values of the first rows |
 //! | `found` | what is found from the first rows |
+//! | `later` | the same again while rows come |
 //! | `hints` | what the first rows suggest that no option says |
 //! | `doubts` | what the values say against the stated noise |
+//! | `transform` | roots and logarithms of values |
 //! | `stuck` | sensors that repeat one value |
 //! | `limits` | detection limits |
 //! | `late` | rows that come late |
@@ -40,6 +42,7 @@ mod instant;
 mod late;
 mod leak;
 mod leak_rooms;
+mod later;
 mod level;
 mod limits;
 mod meaning;
@@ -56,7 +59,10 @@ mod settings;
 mod stuck;
 mod summary;
 mod targets;
+mod transform;
 mod world;
+
+pub(crate) use transform::Transform;
 
 use crate::Ending;
 use crate::arguments::{FitOptions, LeakOptions, Model, RangesOptions, TrackOptions};
@@ -78,9 +84,28 @@ pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {
             options.table.by.clone_from(&instants.roles.by);
             options.accuracy_column.clone_from(&instants.roles.accuracy);
             let (options, corrections) = applied::applied(&options, &instants.names)?;
-            level::run(&options, instants.corrected(corrections))
+            check_transform(&options)?;
+            level::run(&options, instants.corrected(corrections, options.transform))
         }
     }
+}
+
+/// Refuses options that a transform does not go with.
+fn check_transform(options: &TrackOptions) -> Result<(), Error> {
+    let has_slope = matches!(options.model, Some(Model::Velocity | Model::Acceleration));
+    let reason = match (options.transform, has_slope, &options.accuracy_column) {
+        (Some(_), true, _) => {
+            "with --transform the model is that of a level: `walk` or `returning` is expected, or --model left out"
+        }
+        (Some(_), _, Some(_)) => {
+            "accuracies are those of values, not of what --transform makes of them: name the sensors by --columns"
+        }
+        _ => return Ok(()),
+    };
+    Err(Error::Needed {
+        option: if has_slope { "--model walk" } else { "--columns" },
+        reason,
+    })
 }
 
 /// Runs the task `fit`.

@@ -2,6 +2,7 @@
 
 use super::centre::Step;
 use super::rows::Instants;
+use super::transform::Transform;
 use crate::error::Error;
 use crate::output::Cell;
 use crate::say::say;
@@ -40,26 +41,29 @@ pub(super) struct Circle {
     pub(super) low: f64,
 }
 
-/// The cells of a row of a level: of a circle, if it is an angle, and so many coordinates.
-pub(super) fn cells(
-    (circle, coordinates): (Option<Circle>, usize),
-    first: Cell,
-    estimate: &[(f64, f64)],
-    step: &Step,
-    events: String,
-) -> Vec<Cell> {
+/// How a level is written: of a circle, if it is an angle; of which it is a function; so many coordinates.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shown {
+    pub(super) circle: Option<Circle>,
+    pub(super) transform: Option<Transform>,
+    pub(super) coordinates: usize,
+}
+
+/// The cells of a row of a level.
+pub(super) fn cells(shown: Shown, first: Cell, estimate: &[(f64, f64)], step: &Step, events: String) -> Vec<Cell> {
     // An angle is written within one period.
-    let turns = match (circle, estimate.first()) {
+    let turns = match (shown.circle, estimate.first()) {
         (Some(circle), Some((level, _))) => circle.period * ((level - circle.low) / circle.period).floor(),
         _ => 0.0,
     };
     let estimates = estimate
         .iter()
-        .take(coordinates)
+        .take(shown.coordinates)
         .enumerate()
         .flat_map(|(i, (mean, deviation))| {
             let mean = if i == 0 { mean - turns } else { *mean };
-            [mean, mean - BAND * deviation, mean + BAND * deviation].map(|number| Cell::Number(Some(number)))
+            let value = |number| shown.transform.map_or(number, |transform| transform.inverse(number));
+            [mean, mean - BAND * deviation, mean + BAND * deviation].map(|number| Cell::Number(Some(value(number))))
         });
     let last = [
         Cell::Whole(step.reports as i64),

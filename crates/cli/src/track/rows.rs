@@ -1,11 +1,12 @@
 //! Conversion of rows of a table to instants: what each sensor reported at one time.
 
-use super::applied::Correction;
+use super::applied::{Correction, correct};
 use super::columns::{Finds, Kind, Roles};
 use super::held::Held;
 use super::instant::{Instant, Qualifier, Reports};
 use super::late::Late;
 use super::samples::Samples;
+use super::transform::Transform;
 use crate::arguments::TableOptions;
 use crate::clock;
 use crate::error::Error;
@@ -45,6 +46,7 @@ pub(super) struct Instants {
     strange: [u64; 2],
     /// What is corrected in the values of a sensor.
     corrections: Vec<Correction>,
+    transform: Option<Transform>,
     /// Time and cells of the last row.
     before: Option<(f64, Reports)>,
     /// Rows that were read ahead.
@@ -133,6 +135,7 @@ impl Instants {
             copies: 0,
             strange: [0; 2],
             corrections: Vec::new(),
+            transform: None,
             before: None,
             ahead: VecDeque::new(),
             pending: None,
@@ -142,9 +145,13 @@ impl Instants {
         })
     }
 
-    /// The same rows with corrected values.
-    pub(super) fn corrected(self, corrections: Vec<Correction>) -> Self {
-        Self { corrections, ..self }
+    /// The same rows with corrected values, or functions of them.
+    pub(super) fn corrected(self, corrections: Vec<Correction>, transform: Option<Transform>) -> Self {
+        Self {
+            corrections,
+            transform,
+            ..self
+        }
     }
 
     /// The name of the table in messages.
@@ -370,14 +377,10 @@ impl Instants {
         } else {
             cells.enumerate().map(|(sensor, (_, cell))| (sensor, cell)).collect()
         };
-        if !self.corrections.is_empty() {
-            for (sensor, cell) in &mut reports {
-                let name = self.names.get(*sensor);
-                let correction = self.corrections.iter().find(|one| Some(&one.name) == name);
-                if let (Some(correction), Some(value)) = (correction, cell) {
-                    *value = correction.of(*value, seconds);
-                }
-            }
+        correct(&self.corrections, &mut reports, &self.names, seconds);
+        if let Some(transform) = self.transform {
+            let wrong = |problem| Error::content(self.file(), format_args!("row {}: {problem}", self.table.row()));
+            transform.apply(&mut reports, &self.names).map_err(wrong)?;
         }
         let qualifier = |place: &usize| Qualifier {
             accuracy: accuracy.filter(|accuracy| accuracy.is_finite()),

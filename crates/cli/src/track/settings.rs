@@ -1,8 +1,9 @@
 //! Settings of the level and its sensors, from options and first rows.
 
-use super::first::{values, values_of};
+use super::first::{held_values, values, values_in, values_of};
 use super::hints::{circle, hints};
 use super::instant::Instant;
+use super::later::Later;
 use super::limits::{self, limits};
 use super::meaning::{Meaning, Seat, silence};
 use super::report::Circle;
@@ -21,6 +22,8 @@ const FIRST_ROWS: usize = 200;
 /// The same of a table of single reports: for each sensor, and at most.
 const FIRST_REPORTS: usize = 200;
 const MOST_FIRST: usize = 2000;
+/// The same if the likelihood is found on a grid.
+const MOST_ON_GRID: usize = 800;
 /// At most if measurements without a row are among them.
 const MOST_SAMPLES: usize = 20_000;
 /// Values of a sensor from which no further rows are read before the first estimate.
@@ -59,22 +62,8 @@ pub(super) struct Settings {
     pub(super) circle: Option<Circle>,
     /// What the first rows suggest that no option says.
     pub(super) hints: Vec<String>,
-}
-
-/// Number of values of the sensor with the most of them.
-fn values_in<'a>(first: impl IntoIterator<Item = &'a Instant>) -> usize {
-    let mut counts: Vec<usize> = Vec::new();
-    for (sensor, _) in first
-        .into_iter()
-        .flat_map(|instant| &instant.reports)
-        .filter(|(_, cell)| cell.is_some_and(f64::is_finite))
-    {
-        if counts.len() <= *sensor {
-            counts.resize(sensor + 1, 0);
-        }
-        counts[*sensor] += 1;
-    }
-    counts.into_iter().max().unwrap_or(0)
+    /// What is found again while rows come.
+    pub(super) later: Option<Later>,
 }
 
 /// Parses `0.5/1h`. Numbered rows are one second apart.
@@ -145,8 +134,20 @@ impl Settings {
         if first.is_empty() {
             return Err(Error::empty(instants.file(), "rows"));
         }
+        // From a file that is there as a whole, more rows can be read.
+        let more: Vec<Instant> = if instants.is_live() {
+            first.clone()
+        } else {
+            instants
+                .peek(MOST_FIRST)?
+                .iter()
+                .take(MOST_FIRST.max(first.len()))
+                .cloned()
+                .collect()
+        };
+        let looked_at = if known { &first } else { &more };
         let sensors = instants.names.len();
-        let has_negative = (0..sensors).any(|sensor| values_of(&first, sensor).iter().any(|value| *value < 0.0));
+        let has_negative = (0..sensors).any(|sensor| values_of(looked_at, sensor).iter().any(|value| *value < 0.0));
         let mut told = instants.roles.told.clone();
         told.extend(held.iter().map(|sensor| {
             format!(
@@ -158,9 +159,9 @@ impl Settings {
         let period = match options.period.as_deref() {
             Some("no") => None,
             Some(text) => Some(above_zero("--period", text, "a period above 0, as 360, or `no`")?),
-            None if options.reports => None,
+            None if options.reports || options.transform.is_some() => None,
             None => (0..sensors).find_map(|sensor| {
-                let period = circle(&values_of(&first, sensor))?;
+                let period = circle(&values_of(looked_at, sensor))?;
                 let name = &instants.names[sensor];
                 told.push(format!(
                     "{name} goes around a circle of {period}: it is taken for an angle, as --period {period} says; --period no takes it for a number"
@@ -187,18 +188,24 @@ impl Settings {
             .map(silence)
             .transpose()?
             .map(|(width, _)| width);
-        let found_limits = if options.limits.is_some() || options.reports || instants.has_limits {
-            Vec::new()
-        } else {
-            (0..sensors)
-                .map(|sensor| limits::found(&values_of(&first, sensor), &instants.names[sensor], &mut told))
-                .collect()
+        let aligned = |rows: &[Instant]| match within {
+            Some(_) => held_values(rows),
+            None => values(rows, &[]),
         };
+        let found_limits =
+            if options.limits.is_some() || options.reports || instants.has_limits || options.transform.is_some() {
+                Vec::new()
+            } else {
+                (0..sensors)
+                    .map(|sensor| limits::found(&values_of(looked_at, sensor), &instants.names[sensor], &mut told))
+                    .collect()
+            };
         let mut settings = Self {
             limits: found_limits,
             steps: Vec::new(),
             has_slope: false,
             hints: told,
+            later: None,
             may_slope: options.model.is_none(),
             circle: period.map(|period| Circle {
                 period,
@@ -242,7 +249,7 @@ impl Settings {
             losses: gaps.collect(),
             offsets: options
                 .align
-                .map_or(Vec::new(), |rows| offsets(&values(&first[..rows.min(first.len())], &[]), sensors, period)),
+                .map_or(Vec::new(), |rows| offsets(&aligned(&first[..rows.min(first.len())]), sensors, period)),
         };
         if settings.world.interval <= 0.0 {
             settings.world.interval = 1.0;
@@ -288,14 +295,20 @@ impl Settings {
             settings.calibrate(&first, &instants.names, unknown)?;
         }
         settings.world.is_on_grid |= is_cut;
-        // From a file that is there as a whole, more rows can be read. The likelihood on a grid would take too long.
-        if let Some(unknown) = unknown.filter(|unknown| unknown.change || unknown.noise)
-            && !settings.world.is_on_change
-            && !instants.is_live()
-        {
-            let more: Vec<Instant> = instants.peek(MOST_FIRST)?.iter().cloned().collect();
-            if more.len() > first.len() {
-                settings.refine((&first, &more), &instants.names, &unknown)?;
+        if let Some(unknown) = unknown.filter(|unknown| unknown.change || unknown.noise) {
+            // The likelihood on a grid takes long.
+            let most = if settings.world.is_on_change {
+                MOST_ON_GRID
+            } else {
+                MOST_FIRST
+            };
+            if instants.is_live() {
+                settings.later = Some(Later::new(unknown, first.len(), most));
+            } else {
+                let more = &more[..more.len().min(most)];
+                if more.len() > first.len() {
+                    settings.refine((&first, more), &instants.names, &unknown);
+                }
             }
         }
         // Cells have no residual that would tell whether the change is right.
@@ -316,13 +329,12 @@ impl Settings {
         if let Some(rows) = options.align {
             // Of the level each sensor tells a share.
             let weights: Vec<f64> = noises.iter().map(|noise| 1.0 / (noise * noise)).collect();
-            let first = values(&first[..rows.min(first.len())], &[]);
+            let first = aligned(&first[..rows.min(first.len())]);
             settings.world.zero = shift_deviation(&first, &weights, period);
         }
         let is_stated = asked_noise.is_some() || !options.noise.is_empty();
         if is_stated && !options.reports && !settings.world.is_on_grid && !instants.is_live() && !instants.has_samples()
         {
-            let more: Vec<Instant> = instants.peek(MOST_FIRST)?.iter().cloned().collect();
             settings.hints.extend(settings.doubts(&more, &instants.names));
         }
         let found = hints(options, &first, &instants.names, apart, settings.has_slope);

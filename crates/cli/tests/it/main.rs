@@ -32,6 +32,7 @@ mod track_faults;
 mod track_found;
 mod track_kinds;
 mod track_meanings;
+mod track_moves;
 mod track_random;
 
 use std::io::{BufRead, BufReader, Write};

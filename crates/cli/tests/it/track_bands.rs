@@ -7,7 +7,7 @@ use fewbits_numerics::normal::cdf;
 use serde_json::Value;
 
 /// The same of a file, of which more rows can be read than the first ones.
-fn tracked_file(table: &str, options: &[&str]) -> (Vec<Value>, Value) {
+pub(super) fn tracked_file(table: &str, options: &[&str]) -> (Vec<Value>, Value) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("table.csv"), table).unwrap();
     let words = [&["track", "table.csv", "--json"], options].concat();

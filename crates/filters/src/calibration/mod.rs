@@ -217,17 +217,13 @@ where
             let (mean, covariance) = (*belief.mean(), *belief.covariance());
             let said = reading.said(mean[0], covariance[(0, 0)], noises[*sensor], self.period)?;
             let deviation = said.variance.sqrt();
-            let (right, wild) = ((1.0 - WILD) * said.density, reading.wild(WILD, range));
-            log_density += (right + wild).ln();
-            // The moments of the mixture of "it is wild" and "it is not".
-            let weight = right / (right + wild);
-            doubt = doubt.max(1.0 - weight);
+            let doubted = said.doubted(WILD, reading.wild(WILD, range));
+            log_density += doubted.density.ln();
+            doubt = doubt.max(1.0 - doubted.right);
             farthest = farthest.max((said.score * deviation).abs());
             let gain = covariance.column(0) / deviation;
-            let off = said.score * said.score;
-            let spread = weight * ((1.0 - said.left) - (1.0 - weight) * off);
-            let next: SMatrix<f64, D, D> = covariance - gain * gain.transpose() * spread;
-            *belief = Gaussian::from_trusted_parts(mean + gain * (weight * said.score), next);
+            let next: SMatrix<f64, D, D> = covariance - gain * gain.transpose() * doubted.spread;
+            *belief = Gaussian::from_trusted_parts(mean + gain * doubted.score, next);
         }
         Some(InstantLikelihood {
             log_density,

@@ -165,3 +165,28 @@ pub(crate) struct ReadingMoments {
     /// Variance of the prediction, noise included.
     pub(crate) variance: f64,
 }
+
+/// Moments given a reading that is right, or wild, and then says nothing.
+pub(crate) struct Doubtful {
+    /// Density of the reading.
+    pub(crate) density: f64,
+    /// Probability that it is right.
+    pub(crate) right: f64,
+    /// Mean of the innovation afterwards, and what its variance loses, in the prediction's deviations.
+    pub(crate) score: f64,
+    pub(crate) spread: f64,
+}
+
+impl ReadingMoments {
+    /// With this probability of a wild reading, and the density that such ones have together with it.
+    pub(crate) fn doubted(&self, share: f64, wild: f64) -> Doubtful {
+        let density = (1.0 - share) * self.density + wild;
+        let right = (1.0 - share) * self.density / density;
+        Doubtful {
+            density,
+            right,
+            score: right * self.score,
+            spread: right * ((1.0 - self.left) - (1.0 - right) * self.score * self.score),
+        }
+    }
+}

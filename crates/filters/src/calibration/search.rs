@@ -15,6 +15,9 @@ const LITTLE: f64 = 1.0;
 /// Steps of the mean over a number, in `ln`, and how many to either side.
 const SETTLED: f64 = 0.125;
 const FAR: i32 = 16;
+/// After so many terms in a row below this share of the sum, those that are farther out are left out.
+const ENOUGH: u32 = 2;
+const NEGLIGIBLE: f64 = 1e-9;
 
 /// A standard deviation or a factor: known, or to be found from a first guess.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,12 +117,24 @@ impl<L: Fn(f64, &[f64]) -> f64> Search<'_, L> {
         // At the least number it is as small as it may be.
         let is_flat = down < RAISED || self.at(&moved(-down)) >= here - AS_HIGH * down / FAR_BELOW;
         if !is_flat {
-            let (mut sum, mut squares) = (0.0, 0.0);
-            for k in -FAR..=FAR {
-                let by = SETTLED * f64::from(k);
-                let weight = (self.at(&moved(by)) - here + by).exp();
-                sum += weight;
-                squares += weight * (2.0 * by).exp();
+            let (mut sum, mut squares) = (1.0, 1.0);
+            for sign in [-1.0, 1.0] {
+                let mut negligible = 0;
+                for k in 1..=FAR {
+                    let by = sign * SETTLED * f64::from(k);
+                    let weight = (self.at(&moved(by)) - here + by).exp();
+                    let square = weight * (2.0 * by).exp();
+                    sum += weight;
+                    squares += square;
+                    negligible = if weight.max(square) < NEGLIGIBLE * squares {
+                        negligible + 1
+                    } else {
+                        0
+                    };
+                    if negligible == ENOUGH {
+                        break;
+                    }
+                }
             }
             let by = 0.5 * (squares / sum).ln();
             if by.is_finite() && self.at(&moved(by)).is_finite() {

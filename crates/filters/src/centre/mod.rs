@@ -272,7 +272,16 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         &self.filter
     }
 
-    /// The learnt factor of the stated process noise; 1 without learning.
+    /// Sets the factor of the stated process noise, from which learning goes on.
+    ///
+    /// # Errors
+    /// If it is not positive.
+    pub fn set_noise_scale(&mut self, scale: f64) -> Result<(), Error> {
+        self.noise_scale = fewbits_numerics::error::positive("scale", scale)?;
+        Ok(())
+    }
+
+    /// The learnt factor of the stated process noise; 1 without learning, if none is set.
     pub fn noise_scale(&self) -> f64 {
         self.noise_scale
     }

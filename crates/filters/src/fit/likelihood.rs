@@ -141,9 +141,8 @@ impl LevelModel {
             let (expected, variance) = filter.expected(one.sensor, model);
             let expected = expected + model.bias + model.slope * (one.seconds - scale.begin);
             let said = one.reading.said(expected, variance.max(0.0), model.noise, None)?;
-            let (right, wild) = ((1.0 - WILD) * said.density, one.reading.wild(WILD, scale.range));
-            let both = right + wild;
-            product *= both;
+            let doubted = said.doubted(WILD, one.reading.wild(WILD, scale.range));
+            product *= doubted.density;
             let is_in_range = (TINY..HUGE).contains(&product);
             if !is_in_range {
                 total += product.ln();
@@ -152,8 +151,7 @@ impl LevelModel {
             if one.reading.value().is_some() {
                 each(one.sensor, said.score);
             }
-            let weight = right / both;
-            doubt = doubt.max(1.0 - weight);
+            doubt = doubt.max(1.0 - doubted.right);
             let deviation = said.variance.sqrt();
             let distance = (said.score * deviation / model.gain).abs();
             // Not with a gain of zero, which the search may try.
@@ -162,8 +160,7 @@ impl LevelModel {
             } else {
                 farthest
             };
-            let spread = weight * ((1.0 - said.left) - (1.0 - weight) * said.score * said.score);
-            filter.update(weight * said.score / deviation, spread / said.variance);
+            filter.update(doubted.score / deviation, doubted.spread / said.variance);
         }
         Some(InstantLikelihood {
             log_density: total + product.ln(),

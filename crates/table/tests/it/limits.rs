@@ -38,3 +38,17 @@ fn limits_are_numbers_with_a_side() {
     let message = refusal(&mut open("t,x\n0,1.5\n1,2.5\n2,<0.25\n"));
     assert!(message.contains("`<0.25` is not a number"), "{message}");
 }
+
+/// Defect: the first cell of a table of one column without times was taken for its name if it is a limit.
+#[test]
+fn a_limit_is_no_name() {
+    for (text, values) in [
+        ("lead\n<0.1\n0.5\n>40\n", [Some(0.1), Some(0.5), Some(40.0)]),
+        ("a title\nlead\n≤ 0.1\n<0.2\n1.5\n", [Some(0.1), Some(0.2), Some(1.5)]),
+    ] {
+        let mut table = open(text);
+        assert_eq!(table.columns()[0].name, "lead");
+        assert!(table.take_limits(None));
+        assert_eq!(numbers(&rows(&mut table).columns[0]), values);
+    }
+}

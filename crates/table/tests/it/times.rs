@@ -168,3 +168,16 @@ fn times_by_short_names_with_units() {
         assert_eq!(read(&mut table).1, [0.0, 0.25, 0.5], "{name}");
     }
 }
+
+/// Defect: of a time with more decimals than are kept and an exponent, the last digit of the exponent was cut off.
+#[test]
+fn small_times_of_many_digits_with_an_exponent() {
+    let mut table = open("time,x\n8e-06,1\n9.999999999999999e-06,2\n1.1e-05,3\n1.2345678901234567E-04,4\n");
+    table.find_time().unwrap();
+    table.allow_inexact_times(2);
+    let found = read(&mut table).1;
+    for (found, truth) in found.iter().zip([8e-6, 1e-5, 1.1e-5, 1.234_567_890_123_456_7e-4]) {
+        assert!((found - truth).abs() < 1e-9, "{found} {truth}");
+    }
+    assert_eq!(found.len(), 4);
+}
