@@ -245,7 +245,7 @@ impl Rows {
     /// >>> _ = fb.write(pl.DataFrame({"a": [1.5, None, 2.5], "b": [1, 2, 3]}), path)
     /// >>> with fb.open(path) as recording:
     /// ...     recording.select(columns=["b"]).read()["b"]
-    /// array([1, 2, 3])
+    /// array([1., 2., 3.])
     fn read(&self, py: Python<'_>) -> Outcome<Table> {
         let reader = self.batches()?;
         let fields = reader.schema();
