@@ -6,7 +6,7 @@ use crate::table::{Cells, Given, Origin};
 use smallvec::SmallVec;
 
 /// All samples of one time.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(crate) struct Instant {
     pub(crate) seconds: f64,
     /// The first row of the table with this time.
@@ -46,23 +46,35 @@ impl Instants {
         }
     }
 
-    pub(crate) fn iter(&self) -> impl Iterator<Item = Instant> {
-        (0..self.len()).map(|row| match self {
+    /// Writes the instant of this number, which is below `len`.
+    #[inline]
+    pub(crate) fn read(&self, number: usize, instant: &mut Instant) {
+        match self {
             Self::Wide { seconds, columns } => {
-                let mut samples = SmallVec::new();
-                for (number, (cells, missing)) in columns.iter().enumerate() {
-                    if let Some(sample) = sample(number, *missing, cells[row]) {
-                        samples.push(sample);
-                    }
-                }
-                Instant {
-                    seconds: seconds[row],
-                    row,
-                    samples,
+                (instant.seconds, instant.row) = (seconds[number], number);
+                instant.samples.clear();
+                for (sensor, (cells, missing)) in columns.iter().enumerate() {
+                    instant.samples.extend(sample(sensor, *missing, cells[number]));
                 }
             }
-            Self::Long(instants) => instants[row].clone(),
+            Self::Long(instants) => instant.clone_from(&instants[number]),
+        }
+    }
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = Instant> {
+        (0..self.len()).map(|number| {
+            let mut instant = Instant::default();
+            self.read(number, &mut instant);
+            instant
         })
+    }
+
+    /// Numbers of their rows in the table.
+    pub(crate) fn rows(&self) -> Vec<usize> {
+        match self {
+            Self::Wide { seconds, .. } => (0..seconds.len()).collect(),
+            Self::Long(instants) => instants.iter().map(|instant| instant.row).collect(),
+        }
     }
 }
 

@@ -28,6 +28,8 @@ use pyo3::prelude::*;
 /// >>> _ = place.step(5.0)
 /// >>> place.density.shape, place.nodes.shape, bool(abs(np.hypot(*place.mean) - 5) < 0.2)
 /// ((31, 31), (2, 961), True)
+/// >>> place.run(fb.Table({"t": [0.0, 1.0], "z": [5.0, 5.1]}), time="t").columns
+/// ['t', 'x0', 'x0_sd', 'x1', 'x1_sd', 'log_likelihood']
 #[pyclass(module = "fewbits")]
 pub(crate) struct LatticeFilter {
     mean: Py<PyAny>,

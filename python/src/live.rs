@@ -79,7 +79,9 @@ impl<const D: usize> Live for Built<D> {
 fn over<const D: usize>(built: &mut Built<D>, instants: &Instants, smooth: Smooth) -> Outcome<Rows> {
     let mut rows = Rows::new::<D>(instants.len());
     let mut trail = Vec::new();
-    for (number, instant) in instants.iter().enumerate() {
+    let mut instant = Instant::default();
+    for number in 0..instants.len() {
+        instants.read(number, &mut instant);
         if number % ROWS == ROWS - 1 {
             Python::attach(|py| py.check_signals())?;
         }

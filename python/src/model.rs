@@ -14,7 +14,7 @@ use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde::{Deserialize, Serialize};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// Calls `$body` with `$D` a constant equal to `$dimension`.
 macro_rules! with_dimension {
@@ -97,9 +97,11 @@ impl<const D: usize> Moves<D> {
 
 type Affine<const D: usize> = (SMatrix<f64, D, D>, SVector<f64, D>, SMatrix<f64, D, D>);
 
-/// A model that keeps its dynamics over the last time: rows of a table are mostly as far apart as those before.
+/// A model that keeps its dynamics over the first time, which are read without a lock, and over the last: rows of a table are mostly as far
+/// apart as those before.
 pub(crate) struct Remembering<const D: usize> {
     moves: Moves<D>,
+    first: OnceLock<(f64, AffineGaussian<D>)>,
     last: Mutex<Option<(f64, AffineGaussian<D>)>>,
 }
 
@@ -107,20 +109,37 @@ impl<const D: usize> Remembering<D> {
     pub(crate) fn new(moves: Moves<D>) -> Self {
         Self {
             moves,
+            first: OnceLock::new(),
             last: Mutex::new(None),
+        }
+    }
+
+    fn lasting(&self, seconds: f64) -> Result<AffineGaussian<D>, ArgumentError> {
+        // A lock whose owner has panicked holds a whole entry: it is written at once.
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        match *last {
+            Some((same, moved)) if same == seconds => Ok(moved),
+            _ => {
+                let moved = self.moves.lasting(seconds)?;
+                *last = Some((seconds, moved));
+                Ok(moved)
+            }
         }
     }
 }
 
 impl<const D: usize> Evolution<D> for Remembering<D> {
     fn over(&self, seconds: f64) -> Result<Box<dyn GaussianDynamics<D> + '_>, ArgumentError> {
-        // A lock whose owner has panicked holds a whole entry: it is written at once.
-        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        let moved = match *last {
-            Some((same, moved)) if same == seconds => moved,
-            _ => self.moves.lasting(seconds)?,
+        let moved = match self.first.get() {
+            Some((same, moved)) if *same == seconds => *moved,
+            Some(_) => self.lasting(seconds)?,
+            None => {
+                let moved = self.moves.lasting(seconds)?;
+                // Another thread may have been faster.
+                let _ = self.first.set((seconds, moved));
+                moved
+            }
         };
-        *last = Some((seconds, moved));
         Ok(Box::new(moved))
     }
 }

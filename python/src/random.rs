@@ -1,6 +1,6 @@
 //! Random numbers of the library, and the parts of a particle filter over arrays: weights and resampling.
 
-use crate::array::{line, shown, vector};
+use crate::array::{line, shown, vector, zeros};
 use crate::error::{Outcome, refused};
 use crate::given::named;
 use crate::stored::{self, Reduced};
@@ -85,7 +85,7 @@ impl Generator {
         py: Python<'py>,
         #[pyo3(from_py_with = named)] count: usize,
     ) -> Outcome<Bound<'py, PyArray1<f64>>> {
-        let mut normals = vec![0.0; checked(count)?];
+        let mut normals = zeros(checked(count)?)?;
         self.normals.fill(&mut normals);
         Ok(PyArray1::from_vec(py, normals))
     }
@@ -145,7 +145,10 @@ impl Generator {
         py: Python<'py>,
         #[pyo3(from_py_with = named)] count: usize,
     ) -> Outcome<Bound<'py, PyArray1<f64>>> {
-        let uniforms = (0..checked(count)?).map(|_| self.uniforms.random()).collect();
+        let mut uniforms: Vec<f64> = zeros(checked(count)?)?;
+        uniforms
+            .iter_mut()
+            .for_each(|uniform| *uniform = self.uniforms.random());
         Ok(PyArray1::from_vec(py, uniforms))
     }
 }
@@ -207,8 +210,10 @@ pub(crate) fn resample<'py>(
     if u32::try_from(count.max(weights.len())).is_err() {
         return refused("count", count, "less than 2^32, as the number of weights");
     }
-    let mut ancestors = vec![0; count];
+    let (mut ancestors, mut indices) = (zeros(count)?, zeros(count)?);
     let mut rng = Stream::new(seed).fast_rng();
     scheme.ancestors(&mut rng, weights, &mut ancestors)?;
-    Ok(PyArray1::from_vec(py, ancestors.into_iter().map(i64::from).collect()))
+    let found = indices.iter_mut().zip(ancestors);
+    found.for_each(|(index, ancestor)| *index = i64::from(ancestor));
+    Ok(PyArray1::from_vec(py, indices))
 }

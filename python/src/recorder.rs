@@ -120,6 +120,14 @@ impl Recorder {
     }
 
     /// Adds the rows of a table: every column of the recording, and the times (timestamps, or numbers of seconds) unless rows are numbered.
+    ///
+    /// >>> import os, tempfile, fewbits as fb
+    /// >>> path = os.path.join(tempfile.mkdtemp(), "live.fewb")
+    /// >>> recorder = fb.Recorder(path, {"temp": "0.1"})
+    /// >>> recorder.push_table(fb.Table({"time": [0.0, 1.0, 2.0], "temp": [20.0, 20.1, 20.3]}))
+    /// >>> recorder.sync()
+    /// >>> recorder.close() > 0, len(fb.read(path))
+    /// (True, 3)
     fn push_table(&mut self, py: Python<'_>, table: &Bound<'_, PyAny>) -> Outcome<()> {
         let given = Given::read(table)?;
         let recorder = self.open()?;

@@ -239,6 +239,13 @@ impl Rows {
     }
 
     /// All of them, read now.
+    ///
+    /// >>> import polars as pl, fewbits as fb, tempfile, os
+    /// >>> path = os.path.join(tempfile.mkdtemp(), "room.fewb")
+    /// >>> _ = fb.write(pl.DataFrame({"a": [1.5, None, 2.5], "b": [1, 2, 3]}), path)
+    /// >>> with fb.open(path) as recording:
+    /// ...     recording.select(columns=["b"]).read()["b"]
+    /// array([1., 2., 3.])
     fn read(&self, py: Python<'_>) -> Outcome<Table> {
         let reader = self.batches()?;
         let fields = reader.schema();

@@ -1,6 +1,9 @@
 """Any arguments: a result, or an exception that says what is expected; never a panic, never the end of the interpreter."""
 
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pandas as pd
@@ -67,6 +70,14 @@ def search():
 
 
 ANCHORS = {"A": (0.0, 0.0), "B": (9.0, 0.0), "C": (0.0, 9.0)}
+
+
+def small(count):
+    """Without the numbers that fill the memory of the machine."""
+    return 0 if isinstance(count, int) and 10**6 < count <= 2**32 else count
+
+
+DESIGN = fb.design(prior=(0.0, 1.0), noise=[1.0, 1.0], bits=[1, 1])
 CALLS = {
     "encode": (fb.encode, ["samples"], ["bound", "effort"]),
     "decode": (fb.decode, ["frame"], ["out"]),
@@ -149,6 +160,19 @@ CALLS = {
     "Table": (fb.Table, ["columns"], []),
     "plot": (fb.plot, ["table"], ["x", "y", "band"]),
     "Generator": (fb.Generator, ["seed"], []),
+    "Generator.standard_normal": (lambda count: fb.Generator(1).standard_normal(small(count)), ["count"], []),
+    "Generator.random": (lambda count: fb.Generator(1).random(small(count)), ["count"], []),
+    "Design.encode": (DESIGN.encode, ["samples"], []),
+    "Design.decode": (DESIGN.decode, ["words"], []),
+    "Design.c_header": (DESIGN.c_header, ["name"], []),
+    "OneBit.threshold": (
+        lambda **k: fb.OneBit(a=0.9, process=0.5, noise=1.0).threshold(**{"mean": 0.0, "variance": 1.0, **k}),
+        [],
+        ["mean", "variance"],
+    ),
+    "Model.velocity": (fb.Model.velocity, ["density"], []),
+    "Model.acceleration": (fb.Model.acceleration, ["density"], []),
+    "Model.plane": (fb.Model.plane, ["density"], []),
     "Generator.add_normal": (fb.Generator(1).add_normal, ["array", "deviation"], []),
     "design": (
         lambda **k: fb.design(**{"prior": (0.0, 1.0), "noise": [1.0], "bits": [1], "seconds": 0.01, **k}),
@@ -299,10 +323,32 @@ def test_masked_and_missing_cells_are_nan():
 
 def test_whole_numbers_that_no_double_holds_are_not_rounded():
     large = 2**60 + 1
-    for given, bound in (([large, 3], 0.5), (np.array([large]), 0.5), (np.ma.array([large, 2], mask=[0, 1]), None), (pd.Series([large, None], dtype="Int64"), None)):
+    just = 2**53 + 1
+    for given, bound in (([just], None), ([0.5, np.int64(just)], 2.0), (np.array([just]), 0.5), (pl.Series([just, None]), None), ([large, 3], 0.5), (np.array([large]), 0.5), (np.ma.array([large, 2], mask=[0, 1]), None), (pd.Series([large, None], dtype="Int64"), None)):
         with pytest.raises(fb.ArgumentError, match="samples"):
             fb.encode(given, bound)
+    assert fb.decode(fb.encode([2**53 + 2, None], 0.5))[0] == 2**53 + 2 and fb.decode(fb.encode(np.array([just]))) == just
     assert fb.decode(fb.encode(np.array([2**53]), 0.5)) == 2**53 and fb.decode(fb.encode([float(large)], 0.5)) == 2**60
+
+
+def test_a_bound_of_zero_is_refused_with_what_is_lossless():
+    with pytest.raises(fb.ArgumentError, match="or none: then every bit returns"):
+        fb.encode([1.0], 0)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are those of Linux")
+def test_too_many_numbers_are_an_exception_of_memory():
+    program = """
+import resource, fewbits as fb
+resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+for work in (lambda: fb.Generator(1).standard_normal(2**32), lambda: fb.Generator(1).random(2**32), lambda: fb.resample([1.0], count=2**32 - 1, seed=1)):
+    try:
+        work()
+    except MemoryError as error:
+        print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env={**os.environ, "OPENBLAS_NUM_THREADS": "1"})
+    assert done.returncode == 0 and done.stdout.count("no memory for") == 3, done.stderr
 
 
 def test_masks_of_callbacks_are_no_numbers():
