@@ -32,49 +32,31 @@ impl BlockCodec {
         let mut bytes = Bytes(bytes);
         let head = self.read_head(&mut bytes, rows)?;
         let rest = bytes.0;
+        let others = joint_columns(&head, others)?;
+        let keys = match head.coding {
+            Coding::Levels => Some(levels::read(rest, rows, others.as_ref())?),
+            Coding::TabledLevels => Some(levels::read_tabled(rest, rows, learned::read)?),
+            Coding::StoredLevels => Some(levels::read_tabled(rest, rows, stored::read)?),
+            _ => None,
+        };
         let Some(grid) = head.grid else {
-            return Ok(match head.coding {
-                Coding::Raw => raw_samples(rest, rows)?,
-                Coding::Wrapped => from_wrapped_pco::<f64>(rest, rows)?,
-                Coding::Levels => {
-                    let others = joint_columns(&head, others)?;
-                    let keys = levels::read(rest, rows, others.as_ref())?;
-                    keys.into_iter().map(levels::sample_of_key).collect()
-                }
-                Coding::TabledLevels => {
-                    let keys = levels::read_tabled(rest, rows, learned::read)?;
-                    keys.into_iter().map(levels::sample_of_key).collect()
-                }
-                Coding::StoredLevels => {
-                    let keys = levels::read_tabled(rest, rows, stored::read)?;
-                    keys.into_iter().map(levels::sample_of_key).collect()
-                }
+            return Ok(match (keys, head.coding) {
+                (Some(keys), _) => keys.into_iter().map(levels::sample_of_key).collect(),
+                (_, Coding::Raw) => raw_samples(rest, rows)?,
+                (_, Coding::Wrapped) => from_wrapped_pco::<f64>(rest, rows)?,
                 _ => from_pco_bytes::<f64>(rest, rows)?,
             });
         };
         let indices = match head.coding {
-            Coding::Models => {
-                let others = joint_columns(&head, others)?;
-                read_block(rest, true, &grid, rows, others.as_ref())?
-            }
-            Coding::Levels => {
-                let others = joint_columns(&head, others)?;
-                let keys = levels::read(rest, rows, others.as_ref())?;
-                keys.into_iter().map(levels::index_of_key).collect()
-            }
-            Coding::TabledLevels => {
-                let keys = levels::read_tabled(rest, rows, learned::read)?;
-                keys.into_iter().map(levels::index_of_key).collect()
-            }
-            Coding::StoredLevels => {
-                let keys = levels::read_tabled(rest, rows, stored::read)?;
-                keys.into_iter().map(levels::index_of_key).collect()
-            }
+            Coding::Models => read_block(rest, true, &grid, rows, others.as_ref())?,
             Coding::Wrapped => from_wrapped_pco::<i64>(rest, rows)?,
             Coding::Counts => read_block(rest, false, &grid, rows, None)?,
             Coding::Tables => learned::read(rest, rows)?,
             Coding::Stored => stored::read(rest, rows)?,
-            _ => from_pco_bytes::<i64>(rest, rows)?,
+            _ => match keys {
+                Some(keys) => keys.into_iter().map(levels::index_of_key).collect(),
+                None => from_pco_bytes::<i64>(rest, rows)?,
+            },
         };
         let mut samples = grid.values(&indices);
         for (row, sample) in head.exceptions {

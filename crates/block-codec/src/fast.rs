@@ -17,6 +17,9 @@ const LEVEL_BITS: f32 = 4.0;
 /// Bits of an exception.
 const EXCEPTION_BITS: f32 = 72.0;
 
+/// Bits per sample up to which counts are tried besides tables, whose own bytes count then.
+const SPARSE: f32 = 0.25;
+
 type Levels = (Vec<u64>, Vec<i64>);
 
 /// A coding of the rows.
@@ -111,7 +114,12 @@ impl BlockCodec {
         };
         let counted = || write_block(false, grid, &indices, &exceptions, None);
         Ok(Some(match choice {
-            Choice::Symbols(plan) if is_tabled => stored::write(&indices, &plan, head(Coding::Stored))?,
+            Choice::Symbols(plan) if is_tabled => {
+                let bytes = stored::write(&indices, &plan, head(Coding::Stored))?;
+                let bits = 8.0 * bytes.len() as f32 / samples.len() as f32;
+                let other = if bits <= SPARSE { Some(counted()?) } else { None };
+                other.filter(|other| other.len() < bytes.len()).unwrap_or(bytes)
+            }
             Choice::Symbols(_) => counted()?,
             Choice::Levels(found, plan) if is_tabled => {
                 levels::write_tabled(head(Coding::StoredLevels), &found, &plan)?

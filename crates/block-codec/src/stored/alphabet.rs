@@ -7,7 +7,7 @@
 //!        1 to 31    cells -15 to 15
 //! ```
 //!
-//! Contexts: how many cells are zero (6 or more, 5, .. 1; 1 also at the beginning); then for sizes 1 and 2 of the last cell whether the cell before was
+//! Contexts: how many cells are zero (6 or more, also at the beginning, 5, .. 1); then for sizes 1 and 2 of the last cell whether the cell before was
 //! zero, of the other sign, of the same; for sizes 3 and more whether it was of the other sign. Behind symbol 0 the context is the last one.
 //!
 //! Values are not turned. Their contexts are the size of the last cell (0 to 4, 5 to 6, 7 to 9, more) in the order of the values, the last
@@ -87,7 +87,7 @@ pub(super) fn next_context(code: usize, is_of_values: bool) -> usize {
 /// The context at the beginning.
 #[inline(always)]
 pub(super) const fn first_context(is_of_values: bool) -> usize {
-    if is_of_values { behind_value(ZERO) } else { RUNS - 1 }
+    if is_of_values { behind_value(ZERO) } else { 0 }
 }
 
 /// The symbol of a cell.

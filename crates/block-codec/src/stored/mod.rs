@@ -55,6 +55,8 @@ const TAIL_BITS: f32 = 80.0;
 /// Rows of the smallest tail, and bits of the field of its size.
 const TAIL_ROWS: usize = 8;
 const TAIL_FIELD: u32 = 4;
+/// A tail is doubled while there are more than so many times its rows.
+const MOST_TAILS: usize = 8;
 /// Mean differences have so many bits above the low ones.
 const SIZE_BITS: u32 = 1;
 /// Largest number of low bits: differences of differences are at most `2^48` in size.
@@ -120,9 +122,9 @@ pub(crate) fn write(indices: &[i64], plan: &Plan, mut bytes: Vec<u8>) -> Result<
     let Plan { order, low, bits } = *plan;
     let mut differences = order.differences(indices);
     let rows = differences.len();
-    // The largest tail that is short beside the block, or the smallest one that has the bits.
+    // The smallest tail that has the bits, or the largest one that is not most of the block.
     let mut tail = 0;
-    while ((TAIL_ROWS << tail) as f32) * bits < TAIL_BITS && (TAIL_ROWS << tail) * 32 < rows {
+    while ((TAIL_ROWS << tail) as f32) * bits < TAIL_BITS && (TAIL_ROWS << tail) * MOST_TAILS < rows {
         tail += 1;
     }
     let start = Start {

@@ -120,7 +120,7 @@ fn columns_of_one_code_are_read_alone() {
     }
 }
 
-/// Blocks of 2048 rows and more have tables, each column by itself; the last one has counts, in a code that columns share.
+/// Blocks of 1024 rows and more have tables, each column by itself; the last one has counts, in a code that columns share.
 #[test]
 fn fast_recordings_of_many_rows_keep_all_promises() {
     let truth = rows(5500);
