@@ -24,10 +24,10 @@ pub struct Network<S, const D: usize, const M: usize> {
 }
 
 /// One observation per sensor, and the number of reports that were sent.
-pub type Transmitted<const M: usize> = (Vec<Observation<SVector<f64, M>>>, usize);
+type Transmitted<const M: usize> = (Vec<Observation<SVector<f64, M>>>, usize);
 
 /// A sensor of a [`Network`] as a fusion centre knows it, with the scheme `C` and the feedback `A`.
-pub type Remote<S, C, A, const D: usize, const M: usize> = Reporting<S, C, fn(&Gaussian<D>, &Gaussian<M>) -> A, M>;
+type Remote<S, C, A, const D: usize, const M: usize> = Reporting<S, C, fn(&Gaussian<D>, &Gaussian<M>) -> A, M>;
 
 impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Network<S, D, M> {
     /// A network of at least one sensor with threshold `eta >= 0`; values travel in double precision.
@@ -136,7 +136,7 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
     ///
     /// # Errors
     /// If there is no sensor `i`; as [`CovarianceFeedback::new`].
-    pub fn remote(&self, i: usize) -> Result<Remote<S, CovarianceFeedback<S, D, M>, Gaussian<D>, D, M>, Error> {
+    pub(crate) fn remote(&self, i: usize) -> Result<Remote<S, CovarianceFeedback<S, D, M>, Gaussian<D>, D, M>, Error> {
         let sensor = self.sensor(i)?.clone();
         let scheme = CovarianceFeedback::new(sensor.clone(), self.threshold, self.format)?;
         let ask = (|predicted, _| *predicted) as fn(&Gaussian<D>, &Gaussian<M>) -> Gaussian<D>;
@@ -161,7 +161,7 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
     /// Joins all sensors to a centre, numbered from 0, with covariance feedback.
     ///
     /// # Errors
-    /// As [`remote`](Self::remote) and [`FusionCentre::join`].
+    /// As [`CovarianceFeedback::new`] and [`FusionCentre::join`].
     pub fn join<F: StateFilter<D>>(&self, centre: &mut FusionCentre<D, F>) -> Result<(), Error>
     where
         S: LinearSensing<D, M> + 'static,
