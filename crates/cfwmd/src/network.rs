@@ -24,10 +24,10 @@ pub struct Network<S, const D: usize, const M: usize> {
 }
 
 /// One observation per sensor, and the number of reports that were sent.
-type Transmitted<const M: usize> = (Vec<Observation<SVector<f64, M>>>, usize);
+pub type Transmitted<const M: usize> = (Vec<Observation<SVector<f64, M>>>, usize);
 
 /// A sensor of a [`Network`] as a fusion centre knows it, with the scheme `C` and the feedback `A`.
-type Remote<S, C, A, const D: usize, const M: usize> = Reporting<S, C, fn(&Gaussian<D>, &Gaussian<M>) -> A, M>;
+pub type Remote<S, C, A, const D: usize, const M: usize> = Reporting<S, C, fn(&Gaussian<D>, &Gaussian<M>) -> A, M>;
 
 impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Network<S, D, M> {
     /// A network of at least one sensor with threshold `eta >= 0`; values travel in double precision.
