@@ -9,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 /// let squares = fewbits_monte_carlo::parallel::map(&[1, 2, 3], |x| x * x);
 /// assert_eq!(squares, [1, 4, 9]);
 /// ```
-pub(crate) fn map<I: Sync, T: Send>(items: &[I], one: impl Fn(&I) -> T + Sync) -> Vec<T> {
+pub fn map<I: Sync, T: Send>(items: &[I], one: impl Fn(&I) -> T + Sync) -> Vec<T> {
     let results: Vec<Mutex<Option<T>>> = items.iter().map(|_| Mutex::new(None)).collect();
     for_all(items.len(), &|i| {
         let result = one(&items[i]);
