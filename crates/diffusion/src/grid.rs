@@ -56,7 +56,7 @@ impl Grid {
     }
 
     /// Number of cells along each axis.
-    pub(crate) fn counts(&self) -> [usize; 3] {
+    pub fn counts(&self) -> [usize; 3] {
         [0, 1, 2].map(|axis| self.edges[axis].len() - 1)
     }
 
