@@ -127,7 +127,7 @@ impl Config {
     }
 
     /// Slots from one scheduled refresh to the next.
-    pub fn refresh_every(&self) -> Option<u64> {
+    pub(crate) fn refresh_every(&self) -> Option<u64> {
         self.0.refresh_every()
     }
 

@@ -89,11 +89,6 @@ impl Sensor {
         }
     }
 
-    /// The configuration that the receiver has too.
-    pub fn config(&self) -> &Config {
-        &self.config
-    }
-
     /// The reconstruction of the last sample at a receiver that lost nothing; `None` before the first.
     pub fn reconstruction(&self) -> Option<f64> {
         self.encoder.reconstruction()

@@ -176,13 +176,6 @@ impl StreamWriter {
         Ok(())
     }
 
-    /// Bits so far. The finished stream is padded to a multiple of 32.
-    pub fn bits(&self) -> usize {
-        use constriction::stream::Code;
-        let _ = self.encoder.state();
-        self.encoder.num_bits()
-    }
-
     /// The words of the finished stream, then the number of its slots and the CRC-32 (ISO-HDLC) of all of these, little-endian.
     /// [`StreamReader::open`] reads them. For 2^32 slots and more the number is `u32::MAX`.
     pub fn seal(self) -> Vec<u32> {

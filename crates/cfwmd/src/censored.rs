@@ -141,7 +141,7 @@ impl<const M: usize> Censored<M> {
         let (low, high) = rule.interval(prediction[0]);
         // No interval (threshold 0): every measurement is sent, so a missing report was lost on the link.
         let cell = Cell::new(low, high).ok();
-        let mut product = Product::new();
+        let mut product = Product::default();
         if reports.nothing > 0 {
             let factor = match cell {
                 Some(cell) => Levels::silence(cell, noise[(0, 0)], link)?,

@@ -7,7 +7,7 @@
 //! | part | item |
 //! |---|---|
 //! | budget to threshold | [`Budget`](threshold::Budget) |
-//! | the rule, and whose covariance weighs the innovation | [`CensoringRule`](rule::CensoringRule), [`Weighing`](rule::Weighing), [`OwnRecursion`](rule::OwnRecursion) |
+//! | the rule, and the sensor's own innovation covariance | [`CensoringRule`](rule::CensoringRule), [`OwnRecursion`](rule::OwnRecursion) |
 //! | the schemes: state feedback or a schedule, state and covariance feedback, none | [`Censoring`](scheme::Censoring), [`CovarianceFeedback`](scheme::CovarianceFeedback), [`LocalSensor`](no_feedback::LocalSensor) |
 //! | `ln p(value or silence given the noise-free measurement)` | [`Censored`](censored::Censored), [`Ellipsoid`](ellipsoid::Ellipsoid) |
 //! | fusion with feedback, in a [`FusionCentre`](fewbits_filters::centre::FusionCentre) of any filter | [`Network::join`](network::Network::join), [`Network::remote_under`](network::Network::remote_under) |

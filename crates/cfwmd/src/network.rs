@@ -136,7 +136,7 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
     ///
     /// # Errors
     /// If there is no sensor `i`; as [`CovarianceFeedback::new`].
-    pub fn remote(&self, i: usize) -> Result<Remote<S, CovarianceFeedback<S, D, M>, Gaussian<D>, D, M>, Error> {
+    pub(crate) fn remote(&self, i: usize) -> Result<Remote<S, CovarianceFeedback<S, D, M>, Gaussian<D>, D, M>, Error> {
         let sensor = self.sensor(i)?.clone();
         let scheme = CovarianceFeedback::new(sensor.clone(), self.threshold, self.format)?;
         let ask = (|predicted, _| *predicted) as fn(&Gaussian<D>, &Gaussian<M>) -> Gaussian<D>;
@@ -161,7 +161,7 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
     /// Joins all sensors to a centre, numbered from 0, with covariance feedback.
     ///
     /// # Errors
-    /// As [`remote`](Self::remote) and [`FusionCentre::join`].
+    /// As [`CovarianceFeedback::new`] and [`FusionCentre::join`].
     pub fn join<F: StateFilter<D>>(&self, centre: &mut FusionCentre<D, F>) -> Result<(), Error>
     where
         S: LinearSensing<D, M> + 'static,

@@ -64,18 +64,6 @@ pub fn update_through<const D: usize, const M: usize>(
     update_at(belief, predicted, &jacobian, &observed.factor)
 }
 
-/// One step: the time update about the mean ([`predict`]), then [`update_through`].
-///
-/// # Errors
-/// As [`update`].
-pub fn step<const D: usize, const M: usize>(
-    dynamics: &(impl GaussianDynamics<D> + ?Sized),
-    belief: &Gaussian<D>,
-    observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
-) -> Result<(Gaussian<D>, UpdateInfo<D, M>), Error> {
-    update_through(&predict(dynamics, belief), observed)
-}
-
 /// `ln p(observation | past)`, and the posterior minus the prior mean of the noise-free measurement: [`update_through`] without
 /// the posterior of the state.
 ///

@@ -38,7 +38,7 @@ impl Cell {
     /// # Errors
     /// If the threshold is not finite.
     #[inline]
-    pub fn of_sign(sign: Sign, threshold: f64) -> Result<Self, ArgumentError> {
+    pub(crate) fn of_sign(sign: Sign, threshold: f64) -> Result<Self, ArgumentError> {
         error::finite("threshold", threshold)?;
         match sign {
             Sign::Above => Self::new(threshold, f64::INFINITY),

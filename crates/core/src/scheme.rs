@@ -71,8 +71,7 @@ pub trait Scheme<const M: usize>: Send + Sync {
     ) -> Result<Self::Factor, Error>;
 }
 
-/// A scheme whose sensor draws no random numbers, so that it reports without a random source
-/// ([`SchemeNode::answer`](crate::SchemeNode::answer)).
+/// A scheme whose sensor draws no random numbers, so that its reports are the same with every random source.
 ///
 /// Law ([`crate::laws::scheme::deterministic`]): `encode` draws nothing, and the same input gives the same report.
 pub trait Deterministic<const M: usize>: Scheme<M> {}

@@ -3,11 +3,10 @@
 use crate::bits::BitString;
 use crate::error::Error;
 use crate::message::Message;
-use crate::scheme::{Deterministic, Scheme};
+use crate::scheme::Scheme;
 use fewbits_numerics::ArgumentError;
 use nalgebra::SVector;
-use rand::{Rng, TryRng};
-use std::convert::Infallible;
+use rand::Rng;
 
 /// A sensor: takes a measurement and the bits of the feedback, and returns the bits of a report, or silence. It needs no belief and no
 /// model of the state. The trait is object-safe, so that sensors of different kinds can be in one list.
@@ -55,36 +54,6 @@ impl<C: Scheme<M>, const M: usize> SchemeNode<C, M> {
     pub fn new(scheme: C) -> Self {
         let memory = scheme.start();
         Self { scheme, memory }
-    }
-}
-
-impl<C: Deterministic<M>, const M: usize> SchemeNode<C, M> {
-    /// [`SensorNode::report`] without a random source.
-    ///
-    /// # Errors
-    /// As [`SensorNode::report`].
-    pub fn answer(&mut self, measurement: &SVector<f64, M>, feedback: &BitString) -> Result<Option<BitString>, Error> {
-        self.report(&mut Undrawn, measurement, feedback)
-    }
-}
-
-/// A random source for schemes that draw nothing.
-struct Undrawn;
-
-impl TryRng for Undrawn {
-    type Error = Infallible;
-
-    fn try_next_u32(&mut self) -> Result<u32, Infallible> {
-        Ok(0)
-    }
-
-    fn try_next_u64(&mut self) -> Result<u64, Infallible> {
-        Ok(0)
-    }
-
-    fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> Result<(), Infallible> {
-        bytes.fill(0);
-        Ok(())
     }
 }
 

@@ -101,7 +101,7 @@ impl SourceLikelihood {
     }
 
     /// Number of samples of all records.
-    pub fn samples(&self) -> usize {
+    pub(crate) fn samples(&self) -> usize {
         self.records.iter().map(|record| record.samples().len()).sum()
     }
 

@@ -67,13 +67,9 @@ impl ModelGrid {
     }
 
     /// Number of models.
+    #[expect(clippy::len_without_is_empty, reason = "never empty")]
     pub fn len(&self) -> usize {
         self.sensors.len()
-    }
-
-    /// Never true: there is at least one model.
-    pub fn is_empty(&self) -> bool {
-        self.sensors.is_empty()
     }
 
     /// The instants at which the sensors sample, s.

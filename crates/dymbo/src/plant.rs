@@ -11,8 +11,8 @@ use std::f64::consts::FRAC_2_PI;
 
 /// A first-order autoregression `theta(n) = a theta(n-1) + u(n)` sensed as `x(n) = theta(n) + w(n)`.
 ///
-/// With measurement standard deviation `sigma`, all variances are `sigma^2` times those for unit noise at the same coefficient and
-/// [`noise_ratio`](Self::noise_ratio).
+/// With measurement standard deviation `sigma`, all variances are `sigma^2` times those for unit noise at the same coefficient and ratio
+/// `gamma = sigma_u^2 / sigma^2`.
 ///
 /// Deserialization calls [`ScalarPlant::new`], so it refuses an unstable plant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -67,14 +67,6 @@ impl ScalarPlant {
         Self::of(Ar1::new_unstable(coefficient, process_variance)?, measurement_variance)
     }
 
-    /// The plant of unit measurement noise with `gamma = sigma_u^2 / sigma^2`.
-    ///
-    /// # Errors
-    /// As [`ScalarPlant::new`].
-    pub fn with_noise_ratio(coefficient: f64, noise_ratio: f64) -> Result<Self, Error> {
-        Self::new(coefficient, noise_ratio, 1.0)
-    }
-
     /// Refuses a plant that corrections of bounded size cannot hold.
     ///
     /// # Errors
@@ -116,11 +108,6 @@ impl ScalarPlant {
     #[inline]
     pub fn measurement_variance(&self) -> f64 {
         self.sensor.noise_variance()
-    }
-
-    /// `gamma = sigma_u^2 / sigma^2`. Besides `a` it is the only parameter that is not a scale.
-    pub fn noise_ratio(&self) -> f64 {
-        self.process_variance() / self.measurement_variance()
     }
 
     /// The belief one step later: mean `a m`, variance `a^2 M + sigma_u^2`.
@@ -197,7 +184,6 @@ mod tests {
             assert!(matches!(ScalarPlant::new(bad.0, bad.1, bad.2), Err(Error::Argument(_))), "{bad:?}");
         }
         let plant = ScalarPlant::new(-0.7, 0.5, 2.0).unwrap();
-        assert_eq!(plant.noise_ratio(), 0.25);
         let json = serde_json::to_string(&plant).unwrap();
         assert_eq!(serde_json::from_str::<ScalarPlant>(&json).unwrap(), plant);
         assert!(serde_json::from_str::<ScalarPlant>(&json.replace("-0.7", "-1.7")).is_err());

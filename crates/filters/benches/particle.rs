@@ -46,7 +46,10 @@ fn bench_steps<const D: usize>(
 ) {
     let mut rng = Stream::new(2).fast_rng();
     let start = Particles::from_belief(&mut rng, &prior, PARTICLES).unwrap();
-    let rule = ResamplingRule::new(Resampling::Systematic, Schedule::Always);
+    let rule = ResamplingRule {
+        resampling: Resampling::Systematic,
+        schedule: Schedule::Always,
+    };
     let mut filter = BootstrapFilter::new(rule, PARTICLES).unwrap();
     let mut belief = start;
     filter

@@ -17,7 +17,7 @@
 //! | the exact answer for a few numbers | | [`LatticeKernel`] (independent noise on each) |
 //! | smoothing | | [`smoother`] (Gaussian beliefs: Rauch-Tung-Striebel), [`backward_simulation`] (particles), [`TransitionKernel::smooth`] (a grid) |
 //! | calibration of sensors and level from recorded readings | [`fit`] (maximum likelihood), [`calibration`] (noises and change alone) | |
-//! | the steady state | [`scalar_steady_state`] (closed form, any message quality), [`steady_state`] (doubling) | |
+//! | the steady state | [`scalar_steady_state`] (closed form, any message quality) | |
 //! | a bound for all of them | [`cramer_rao`] (posterior Cramer-Rao recursions) | |
 //! | a receiver of many sensors: prediction over time, failed sensors, tests of the model, learnt noise | [`centre::FusionCentre`] | |
 //!
@@ -78,8 +78,7 @@ pub use rao_blackwell::{RaoBlackwellised, impute};
 pub use resample::{Resampling, ResamplingRule, Schedule};
 pub use root_gaussian::RootGaussian;
 pub use sigma_points::SigmaPointFilter;
-pub use smoother::scalar_fixed_lag_variance;
-pub use steady_state::{ScalarSteadyState, SteadyState, scalar_steady_state, steady_state};
+pub use steady_state::{ScalarSteadyState, scalar_steady_state};
 pub use switching::Switching;
 pub use transition_kernel::TransitionKernel;
 pub use {nalgebra, rand};

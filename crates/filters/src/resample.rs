@@ -43,9 +43,6 @@ pub enum Resampling {
 }
 
 impl Resampling {
-    /// All four methods.
-    pub const ALL: [Self; 4] = [Self::Systematic, Self::Stratified, Self::Residual, Self::Multinomial];
-
     /// Fills `ancestors` with indices into `weights`, in increasing order. The weights need not be normalised.
     ///
     /// # Errors
@@ -135,11 +132,6 @@ pub struct ResamplingRule {
 }
 
 impl ResamplingRule {
-    /// This law at these times.
-    pub fn new(resampling: Resampling, schedule: Schedule) -> Self {
-        Self { resampling, schedule }
-    }
-
     /// Resamples if the schedule says so. Returns whether it did. `ancestors` is a buffer, of any length.
     ///
     /// # Errors

@@ -71,23 +71,12 @@ pub(crate) fn smooth_along<const D: usize>(
     Ok(Gaussian::from_trusted_parts(next, (found + found.transpose()) * 0.5))
 }
 
-/// Steady-state variance of a scalar fixed-lag smoother: `V_0 = M`, `V_l = M + C^2 (V_{l-1} - P)` with `C = a M / P`, from the
-/// filter's steady predicted variance `P` and filtered variance `M`.
-pub fn scalar_fixed_lag_variance(coefficient: f64, steady: &crate::ScalarSteadyState, lag: usize) -> f64 {
-    let (p, m) = (steady.predicted_variance, steady.filtered_variance);
-    if p == 0.0 {
-        return 0.0;
-    }
-    let gain = coefficient * m / p;
-    (0..lag).fold(m, |variance, _| m + gain * gain * (variance - p))
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{scalar_fixed_lag_variance, smooth_step};
-    use crate::{kalman, scalar_steady_state};
+    use super::smooth_step;
+    use crate::kalman;
     use fewbits_core::{Dynamics, Gaussian, Sensing};
-    use fewbits_models::{Ar1, LinearSensor, constant_velocity_1d};
+    use fewbits_models::{LinearSensor, constant_velocity_1d};
     use nalgebra::{DMatrix, DVector, SMatrix, Vector2};
     use rand::SeedableRng;
     use rand_pcg::Pcg64Mcg;
@@ -175,23 +164,5 @@ mod tests {
             let expected = direction * direction.transpose() * (0.25 * scale * scale);
             assert!((smoothed.covariance() - expected).amax() < 1e-9 * scale * scale);
         }
-    }
-
-    #[test]
-    fn steady_lag_variance_is_where_the_recursion_settles() {
-        let dynamics = Ar1::new(0.9, 0.5).unwrap();
-        let sensing = LinearSensor::direct(1.0).unwrap();
-        let mut filtered = vec![Gaussian::scalar(0.0, 1.0).unwrap()];
-        for n in 0..200 {
-            filtered.push(
-                kalman::step(&dynamics, &sensing, &filtered[n], &SMatrix::zeros())
-                    .unwrap()
-                    .0,
-            );
-        }
-        let back = filtered[196..200].iter().rev();
-        let lagged = back.fold(filtered[200], |next, belief| smooth_step(&dynamics, belief, &next).unwrap());
-        let steady = scalar_steady_state(0.9, 0.5, 1.0, 1.0).unwrap();
-        assert!((lagged.covariance()[0] - scalar_fixed_lag_variance(0.9, &steady, 4)).abs() < 1e-13);
     }
 }

@@ -64,17 +64,6 @@ impl<R> HandoffFilter<R> {
         })
     }
 
-    /// The filter of the paper: without shrinkage.
-    ///
-    /// # Errors
-    /// If `particles` is zero.
-    pub fn of_paper(particles: usize, reducer: R) -> Result<Self, Error> {
-        Ok(Self {
-            shrink: false,
-            ..Self::new(particles, reducer)?
-        })
-    }
-
     /// The weighted particles after receiving, predicting and updating, and the increment of the log likelihood.
     ///
     /// # Errors

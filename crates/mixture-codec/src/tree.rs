@@ -71,7 +71,7 @@ impl<const D: usize> Node<D> {
     ///
     /// # Errors
     /// If the node's covariance is not positive definite, which cannot happen for a node of a tree.
-    pub fn component(&self) -> Result<Component<D>, Error> {
+    pub(crate) fn component(&self) -> Result<Component<D>, Error> {
         Component::new(self.weight, self.mean, self.covariance)
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use fewbits_core::Sensing;
-use fewbits_numerics::error::{all_finite, finite, non_negative, positive};
+use fewbits_numerics::error::{all_finite, finite, positive};
 use nalgebra::{Matrix1, SMatrix, SVector, Vector1};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -33,7 +33,6 @@ use std::f64::consts::LN_10;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LogDistance<const D: usize> {
     position: SVector<f64, D>,
-    height: f64,
     level: f64,
     exponent: f64,
     noise_variance: f64,
@@ -51,20 +50,10 @@ impl<const D: usize> LogDistance<D> {
         all_finite("position", position.as_slice())?;
         Ok(Self {
             position,
-            height: 0.0,
             level: finite("level", level)?,
             exponent: positive("exponent", exponent)?,
             noise_variance: positive("deviation", deviation)?.powi(2),
         })
-    }
-
-    /// The same at a constant difference of height from the target, which is no coordinate of the state.
-    ///
-    /// # Errors
-    /// If it is negative or not finite.
-    pub fn at_height(self, height: f64) -> Result<Self, Error> {
-        let height = non_negative("height", height)?;
-        Ok(Self { height, ..self })
     }
 
     /// The distance at which the level is heard without noise: `10^((level at 1 - heard) / (10 exponent))`.
@@ -73,7 +62,7 @@ impl<const D: usize> LogDistance<D> {
     }
 
     fn squared_distance(&self, at: &SVector<f64, D>) -> f64 {
-        (at - self.position).norm_squared() + self.height * self.height
+        (at - self.position).norm_squared()
     }
 }
 

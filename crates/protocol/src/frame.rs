@@ -6,7 +6,7 @@ use core::fmt;
 use crc::{CRC_16_XMODEM, Crc};
 
 /// The version of the wire format that this crate writes and reads.
-pub const VERSION: u8 = 1;
+pub(crate) const VERSION: u8 = 1;
 /// Bytes of the header: one for version, kind and padding, three for the slot, four for the digest.
 const HEADER_BYTES: usize = 8;
 /// Bytes of the destination, which follows the header in a handover.
@@ -107,13 +107,9 @@ impl<'a> Frame<'a> {
     }
 
     /// Length of the encoded frame in bytes.
+    #[expect(clippy::len_without_is_empty, reason = "never empty")]
     pub fn len(&self) -> usize {
         self.kind.overhead() + self.payload.bytes().len()
-    }
-
-    /// Never true: a frame has at least a header.
-    pub fn is_empty(&self) -> bool {
-        false
     }
 
     /// Writes the frame to the beginning of `buffer` and returns the bytes written. `None` if they do not fit.

@@ -54,7 +54,7 @@ mod slot;
 pub use centre::{Action, Centre, CentreSettings, CentreTimer, Member, Recipient};
 #[cfg(feature = "std")]
 pub use echo::{ReportLength, echo, reports_of};
-pub use frame::{CHECK_BYTES, Check, DecodeError, Frame, Kind, VERSION, digest};
+pub use frame::{CHECK_BYTES, Check, DecodeError, Frame, Kind, digest};
 #[cfg(feature = "std")]
 pub use handover::{Bearer, Errand, Lead, Leader};
 pub use note::Note;

@@ -71,13 +71,9 @@ impl Deployment {
     }
 
     /// Number of nodes, at least one.
+    #[expect(clippy::len_without_is_empty, reason = "never empty")]
     pub fn len(&self) -> usize {
         self.positions.len()
-    }
-
-    /// Never true: a deployment has at least one node.
-    pub fn is_empty(&self) -> bool {
-        self.positions.is_empty()
     }
 
     /// Index of the node nearest to a point; the lowest index in a tie.

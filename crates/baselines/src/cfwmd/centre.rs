@@ -1,10 +1,11 @@
 //! Censoring sensors and their fusion centre with messages as bits: an [`Estimator`], and the sensors' half.
 
+use super::Weighing;
 use crate::over_bits::{Estimator, moments};
 use fewbits_cfwmd::Error;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::no_feedback::advance;
-use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion, Weighing};
+use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::scheme::Censoring;
 use fewbits_core::{
     BitReader, BitString, BitWriter, CodecError, Gaussian, Likelihood, LinearDynamics, LinearSensing, Message,

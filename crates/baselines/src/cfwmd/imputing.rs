@@ -85,7 +85,10 @@ where
 {
     check(network, observations)?;
     let (mut next, mut info, mut arrived) = (belief.clone(), Info::default(), 0_usize);
-    let rule = ResamplingRule::new(Resampling::Systematic, Schedule::Below(0.5));
+    let rule = ResamplingRule {
+        resampling: Resampling::Systematic,
+        schedule: Schedule::Below(0.5),
+    };
     RaoBlackwellised::new(rule, next.cloud.means().len())?.predict(&mut &mut *rng, dynamics, &mut next.cloud)?;
     for estimate in next.cloud.means_mut().parts_mut().1.chunks_exact_mut(D) {
         let moved = dynamics.transition() * SVector::<f64, D>::from_column_slice(estimate);

@@ -6,10 +6,12 @@ mod cross_covariance;
 pub mod imputing;
 mod particles;
 pub mod trigger;
+mod weighing;
 
 pub use cross_covariance::cross_covariance_step;
 pub use imputing::ImputedBelief;
 pub use particles::likelihood_of_particles;
+pub use weighing::Weighing;
 
 use fewbits_cfwmd::Error;
 use fewbits_cfwmd::network::Network;

@@ -13,7 +13,7 @@ use fewbits_numerics::roots::bracketed;
 /// If `level` is 1 or less, or `|a| > 1`.
 pub fn noise_ratio_at_loss(level: f64, coefficient: f64) -> Result<Option<f64>, Error> {
     check_level(level)?;
-    let at = |log_gamma: f64| ScalarPlant::with_noise_ratio(coefficient, log_gamma.exp())?.loss();
+    let at = |log_gamma: f64| ScalarPlant::new(coefficient, log_gamma.exp(), 1.0)?.loss();
     Ok(crossing(level, LOG_GAMMA, at)?.map(f64::exp))
 }
 
@@ -23,7 +23,7 @@ pub fn noise_ratio_at_loss(level: f64, coefficient: f64) -> Result<Option<f64>, 
 /// If `level` is 1 or less, or `noise_ratio` is not positive.
 pub fn coefficient_at_loss(level: f64, noise_ratio: f64) -> Result<Option<f64>, Error> {
     check_level(level)?;
-    crossing(level, (0.0, 1.0), |a| ScalarPlant::with_noise_ratio(a, noise_ratio)?.loss())
+    crossing(level, (0.0, 1.0), |a| ScalarPlant::new(a, noise_ratio, 1.0)?.loss())
 }
 
 /// Range of `ln gamma` that is searched.
@@ -84,7 +84,7 @@ pub fn noise_ratio_at_true_loss(level: f64, coefficient: f64) -> Result<Option<f
     let Some(predicted) = noise_ratio_at_loss(level, coefficient)? else {
         return Ok(None);
     };
-    let at = |log: f64| true_loss(&ScalarPlant::with_noise_ratio(coefficient, log.exp())?);
+    let at = |log: f64| true_loss(&ScalarPlant::new(coefficient, log.exp(), 1.0)?);
     let root = crossing(level, ((CLOSE * predicted).ln(), predicted.ln()), at)?;
     Ok(root.map(f64::exp))
 }
@@ -98,7 +98,7 @@ pub fn coefficient_at_true_loss(level: f64, noise_ratio: f64) -> Result<Option<f
     let Some(predicted) = coefficient_at_loss(level, noise_ratio)? else {
         return Ok(None);
     };
-    let at = |a: f64| true_loss(&ScalarPlant::with_noise_ratio(a, noise_ratio)?);
+    let at = |a: f64| true_loss(&ScalarPlant::new(a, noise_ratio, 1.0)?);
     crossing(level, (CLOSE * predicted, predicted), at)
 }
 
@@ -119,7 +119,7 @@ mod tests {
                 // At a = 1 the loss starts at sqrt(pi/2), so lower levels are never crossed.
                 match noise_ratio_at_loss(level, a).unwrap() {
                     Some(gamma) => {
-                        let plant = ScalarPlant::with_noise_ratio(a, gamma).unwrap();
+                        let plant = ScalarPlant::new(a, gamma, 1.0).unwrap();
                         assert!((plant.loss().unwrap() - level).abs() < 1e-12);
                     }
                     None => assert!(a == 1.0 && level < 1.2533),
@@ -159,7 +159,7 @@ mod tests {
     #[test]
     fn true_losses_lie_on_their_contours() {
         let gamma = noise_ratio_at_true_loss(2.0, 0.95).unwrap().unwrap();
-        assert!((true_loss(&ScalarPlant::with_noise_ratio(0.95, gamma).unwrap()).unwrap() - 2.0).abs() < 1e-11);
+        assert!((true_loss(&ScalarPlant::new(0.95, gamma, 1.0).unwrap()).unwrap() - 2.0).abs() < 1e-11);
         assert_eq!(noise_ratio_at_true_loss(1.2, 1.0), Ok(None));
         assert_eq!(coefficient_at_true_loss(2.0, 0.5), Ok(None));
     }

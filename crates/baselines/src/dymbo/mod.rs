@@ -9,6 +9,8 @@
 //! | where the loss reaches a level; a bound of the error under losses | [`contours`] |
 //! | what a first message is worth | [`first_message`] |
 //! | a filter of its own for sign bits of vector states, one after the other or at once | [`SignFilter`] |
+//! | the steady state of the Kalman filter of a vector | [`steady_state`] |
+//! | the steady error of a scalar fixed-lag smoother | [`scalar_fixed_lag_variance`] |
 //! | the published centre of identical sensors over bits | [`centre`] |
 
 pub mod centre;
@@ -17,9 +19,11 @@ pub mod first_message;
 pub mod gap;
 pub mod iterated;
 pub mod skew_normal;
+mod steady;
 pub mod tree;
 mod vector;
 
+pub use steady::{SteadyState, scalar_fixed_lag_variance, steady_state};
 pub use vector::{SignFilter, VectorInfo};
 
 use fewbits_core::Gaussian;

@@ -110,14 +110,14 @@ mod tests {
     #[test]
     fn mmse_and_excess_add_up_to_the_chains_error() {
         for (a, gamma) in [(0.9, 0.5), (-0.6, 2.0), (1.0, 0.1)] {
-            let plant = ScalarPlant::with_noise_ratio(a, gamma).unwrap();
+            let plant = ScalarPlant::new(a, gamma, 1.0).unwrap();
             let levels = first_message_tree(&plant, 1.0, 7).unwrap();
             let exact = chain::first_message_transient(&plant, 1.0, 13.0 / 12.0, 7).unwrap();
             for (level, step) in levels.iter().zip(&exact[1..]) {
                 assert!((level.mse() - step.mse).abs() < 1e-12, "{a} {gamma} {}", level.mse() - step.mse);
             }
         }
-        let plant = ScalarPlant::with_noise_ratio(0.9, 0.5).unwrap();
+        let plant = ScalarPlant::new(0.9, 0.5, 1.0).unwrap();
         assert!(first_message_tree(&plant, 1.0, 0).is_err() && first_message_tree(&plant, 0.0, 3).is_err());
         assert!(first_message_tree(&ScalarPlant::new(0.9, 0.0, 1.0).unwrap(), 1.0, 3).is_err());
     }

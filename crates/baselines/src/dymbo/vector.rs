@@ -4,9 +4,10 @@
 //! `(pi/2)(h'Ph + sigma^2) - h'Ph`. The sensors of a slot report one after the other, each against the refreshed prediction, or
 //! all at once against the same one.
 
+use super::SteadyState;
 use fewbits_core::{Factor, Gaussian, LinearDynamics, Link, Observation, Scheme, Sign};
 use fewbits_dymbo::{Error, SignBit, sign_bit};
-use fewbits_filters::{SteadyState, kalman};
+use fewbits_filters::kalman;
 use fewbits_models::ScalarSensor;
 use fewbits_numerics::error::ArgumentError;
 use fewbits_numerics::linalg::{solve_semidefinite, symmetrised};

@@ -163,7 +163,10 @@ fn the_three_centres_agree_over_a_run() {
     let mut recursion = OwnRecursion::new(&start);
     let mut gaussian = start;
     let mut rng = Stream::new(10).fast_rng();
-    let rule = ResamplingRule::new(Resampling::Systematic, Schedule::Below(0.5));
+    let rule = ResamplingRule {
+        resampling: Resampling::Systematic,
+        schedule: Schedule::Below(0.5),
+    };
     let mut filter = BootstrapFilter::new(rule, 30_000).unwrap();
     let mut cloud = Particles::from_draws(30_000, || *start.mean()).unwrap();
     let mut mixture = RaoBlackwellised::new(rule, 3_000).unwrap();

@@ -191,5 +191,8 @@ fn a_rule_that_changes_from_slot_to_slot_is_renewed() {
         assert!(centre.sensor(0).unwrap().working < 1.0);
     }
     assert!(centre.estimate().covariance()[(0, 0)] < belief.covariance()[(0, 0)]);
-    assert!(centre.renew(9, network.remote(0).unwrap()).is_err() && network.remote(5).is_err());
+    let rule = network.rules_under(&belief).unwrap().remove(0);
+    assert!(
+        centre.renew(9, network.remote_under(0, &rule).unwrap()).is_err() && network.remote_under(5, &rule).is_err()
+    );
 }

@@ -71,11 +71,6 @@ pub struct Product {
 }
 
 impl Product {
-    /// The product of no observations.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Multiplies by the factor of one more observation. One that equals an earlier one raises its count.
     pub fn push(&mut self, factor: Scalar) {
         self.push_repeated(Repeated { factor, count: 1 });
@@ -102,7 +97,7 @@ impl Product {
 
 impl FromIterator<Scalar> for Product {
     fn from_iter<I: IntoIterator<Item = Scalar>>(factors: I) -> Self {
-        let mut product = Self::new();
+        let mut product = Self::default();
         factors.into_iter().for_each(|factor| product.push(factor));
         product
     }

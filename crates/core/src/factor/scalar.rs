@@ -18,9 +18,6 @@ pub struct Constant {
 }
 
 impl Constant {
-    /// An observation that carries no information, of probability 1.
-    pub const ONE: Self = Self { probability: 1.0 };
-
     /// An observation of the given probability under every measurement. Zero makes it impossible.
     ///
     /// # Errors
@@ -36,11 +33,6 @@ impl Constant {
         Self {
             probability: link.delivery(observation),
         }
-    }
-
-    /// The probability of the observation.
-    pub fn probability(&self) -> f64 {
-        self.probability
     }
 }
 

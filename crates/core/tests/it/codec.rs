@@ -100,7 +100,7 @@ fn nothing_is_not_erased() {
     // P(1.5 <= 1 + N(0, 4) < 3) = Phi(1) - Phi(1/4).
     let inside = Cell::new(1.5, 3.0).unwrap().log_probability(1.0, 2.0);
     assert!((inside.exp() - (0.841_344_746_068_542_9 - 0.598_706_325_682_923_7)).abs() < 1e-15);
-    let above = Cell::of_sign(Sign::Above, 0.5).unwrap();
+    let above = Cell::new(0.5, f64::INFINITY).unwrap();
     assert!(above.contains(0.5) && !above.contains(0.4));
 }
 

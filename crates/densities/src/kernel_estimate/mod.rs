@@ -84,13 +84,9 @@ impl<const D: usize> KernelEstimate<D> {
     }
 
     /// Number of kernels, at least one.
+    #[expect(clippy::len_without_is_empty, reason = "never empty")]
     pub fn len(&self) -> usize {
         self.particles.len()
-    }
-
-    /// Never true: an estimate has at least one kernel.
-    pub fn is_empty(&self) -> bool {
-        self.particles.is_empty()
     }
 
     /// The kernel's covariance, factored.

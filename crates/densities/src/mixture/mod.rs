@@ -70,13 +70,9 @@ impl<const D: usize> Mixture<D> {
     }
 
     /// Number of components, at least one.
+    #[expect(clippy::len_without_is_empty, reason = "never empty")]
     pub fn len(&self) -> usize {
         self.components.len()
-    }
-
-    /// Never true: a mixture has at least one component.
-    pub fn is_empty(&self) -> bool {
-        self.components.is_empty()
     }
 
     /// Mean.

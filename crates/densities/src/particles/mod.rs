@@ -146,13 +146,9 @@ impl<const D: usize> Particles<D> {
     }
 
     /// Number of particles, at least one.
+    #[expect(clippy::len_without_is_empty, reason = "never empty")]
     pub fn len(&self) -> usize {
         self.weights.len()
-    }
-
-    /// Never true: a belief has at least one particle.
-    pub fn is_empty(&self) -> bool {
-        self.weights.is_empty()
     }
 
     /// The coordinates: `columns()[d][i]` is coordinate `d` of particle `i`.

@@ -184,13 +184,9 @@ impl<const D: usize> Cells<D> {
     }
 
     /// Number of cells.
+    #[expect(clippy::len_without_is_empty, reason = "never empty")]
     pub fn len(&self) -> usize {
         self.weights.len()
-    }
-
-    /// Never true: at least one cell holds mass.
-    pub fn is_empty(&self) -> bool {
-        self.weights.is_empty()
     }
 
     /// Side of a cell.

@@ -65,7 +65,7 @@ fn arguments_are_refused() {
         .is_err()
     );
     assert!(hermite([21, 0], &Vector2::zeros(), &Matrix2::identity()).is_err() && multi_indices::<2>(21).is_err());
-    assert!(MixtureFit::new(0).is_err() && MixtureFit::new(2).unwrap().with_min_weight(2.0).is_err());
+    assert!(MixtureFit::new(0).is_err());
     assert!(
         Predictions::new(&[], &[], 1.0).is_err()
             && Predictions::new(&[vec![1.0], vec![1.0, 2.0]], &[0.5, 0.5], 1.0).is_err()

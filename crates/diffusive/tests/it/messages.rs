@@ -52,7 +52,7 @@ fn beliefs_arrive_as_they_were_sent() {
             let sent = project(&posterior, form, &rate).unwrap().unwrap();
             let fit = Fit {
                 chi_squared: 7.25,
-                samples: likelihood.samples(),
+                samples: likelihood.records().iter().map(|record| record.samples().len()).sum(),
             };
             let packet = Packet::belief_of(&sent, &fit, &format.wire).unwrap();
             let bits = round_trip(&packet, &format).unwrap();

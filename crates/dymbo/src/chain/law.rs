@@ -92,7 +92,7 @@ impl MessageLaw {
         within("sensors", sensors as f64, 1.0, MAX_SEQUENCE as f64)?;
         let (scheme, r) = (SignBit::of(plant), plant.measurement_variance());
         let mut law = Self::empty();
-        (law.corrections, law.factors) = (vec![0.0], vec![(0.0, Product::new())]);
+        (law.corrections, law.factors) = (vec![0.0], vec![(0.0, Product::default())]);
         let mut p = predicted_variance;
         for _ in 0..sensors {
             let gain = SQRT_2_OVER_PI * innovation_gain(p, r);

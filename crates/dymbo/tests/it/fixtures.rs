@@ -3,9 +3,10 @@
 //! The deterministic ones are computed here and compared within their tolerance. Those that carry a standard error are
 //! Monte-Carlo results; the figures reproduce them, and this test only makes sure that none is forgotten.
 
-use fewbits_baselines::dymbo::SignFilter;
 use fewbits_baselines::dymbo::first_message::{first_message_mse, first_message_value};
-use fewbits_baselines::dymbo::{contours, iterated, skew_normal, tree};
+use fewbits_baselines::dymbo::{
+    SignFilter, contours, iterated, scalar_fixed_lag_variance, skew_normal, steady_state, tree,
+};
 use fewbits_core::factor::{Factor, Levels};
 use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
 use fewbits_dymbo::chain::{self, TransientStep};
@@ -13,9 +14,7 @@ use fewbits_dymbo::{
     CountFusion, DymboFilter, MultibitFilter, Multiple, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant,
     filtered_variance, sign_bit, steady,
 };
-use fewbits_filters::{
-    PointMass, TransitionKernel, UniformGrid, assumed_density, kalman, scalar_fixed_lag_variance, steady_state,
-};
+use fewbits_filters::{PointMass, TransitionKernel, UniformGrid, assumed_density, kalman};
 use fewbits_models::{LinearGaussian, LinearSensor, ScalarSensor};
 use fewbits_quantizers::lloyd_max::gaussian_table;
 use nalgebra::{Matrix2, Vector2};
@@ -228,7 +227,7 @@ fn steady_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
 }
 
 fn loss_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
-    let at = |a: f64, gamma: f64| ScalarPlant::with_noise_ratio(a, gamma).unwrap();
+    let at = |a: f64, gamma: f64| ScalarPlant::new(a, gamma, 1.0).unwrap();
     let value = match entry.id.strip_prefix("loss.")? {
         "max_unit_square" => at(1.0, 1.0).loss(),
         "gamma_at_2_a1" => return contours::noise_ratio_at_loss(2.0, 1.0).unwrap().map(|g| vec![g]),
@@ -252,7 +251,7 @@ fn grid_entry(entry: &Entry<'_>, loss: bool) -> Vec<f64> {
     let gammas = entry.numbers("gamma");
     let over = |a: f64| {
         gammas.iter().map(move |gamma| {
-            let plant = ScalarPlant::with_noise_ratio(a, *gamma).unwrap();
+            let plant = ScalarPlant::new(a, *gamma, 1.0).unwrap();
             if loss {
                 plant.loss().unwrap()
             } else {

@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_2_PI, PI};
 
 /// Of unit measurement noise.
 fn plant(a: f64, gamma: f64) -> ScalarPlant {
-    ScalarPlant::with_noise_ratio(a, gamma).unwrap()
+    ScalarPlant::new(a, gamma, 1.0).unwrap()
 }
 
 /// Steady filtered variance of the Kalman filter.

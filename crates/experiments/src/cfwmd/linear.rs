@@ -4,12 +4,13 @@ use super::rows::Ensemble;
 use super::setting::{Linear, Setting};
 use super::world::{At, Centre, Draws, Known, Named, World};
 use crate::prelude::*;
+use fewbits_baselines::cfwmd::Weighing;
 use fewbits_baselines::cfwmd::trigger::{StochasticTrigger, Triggered};
 use fewbits_baselines::cfwmd::{ImputedBelief, fuse_received, imputing, likelihood_of_particles};
 use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::no_feedback::{JointBelief, LocalSensor, joint};
-use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion, OwnStep, Weighing};
+use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion, OwnStep};
 use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::{Likelihood, NumberFormat, Scheme as _};
@@ -229,7 +230,10 @@ impl<const M: usize> Line<M> {
         let root = semidefinite_factor("initial covariance", self.start.covariance())?;
         let mut draw = || self.start.mean() + root * Vector2::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
         let mut cloud = Particles::from_draws(count, &mut draw)?;
-        let rule = ResamplingRule::new(Resampling::Systematic, Schedule::Always);
+        let rule = ResamplingRule {
+            resampling: Resampling::Systematic,
+            schedule: Schedule::Always,
+        };
         let mut filter = BootstrapFilter::new(rule, count)?;
         let moments = |cloud: &Particles<2>| {
             let mean = cloud.mean();

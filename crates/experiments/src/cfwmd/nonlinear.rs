@@ -76,7 +76,10 @@ impl World<4, 1> for Plane {
         let threshold = self.budget.threshold(1)?;
         let mut rng = stream.named("particles").fast_rng();
         let mut cloud = self.cloud(&mut rng)?;
-        let rule = ResamplingRule::new(Resampling::Systematic, Schedule::Always);
+        let rule = ResamplingRule {
+            resampling: Resampling::Systematic,
+            schedule: Schedule::Always,
+        };
         let mut filter = BootstrapFilter::new(rule, self.particles)?;
         let network = Network::new(self.sensors.clone(), threshold, Link::PERFECT)?;
         let always = CensoringRule::scalar(1.0, 0.0)?;

@@ -7,7 +7,7 @@ use super::rates::{Rates, as_printed, misses};
 use super::rows::{Part, Step};
 use super::setting::{Linear, Setting};
 use crate::prelude::*;
-use fewbits_cfwmd::rule::Weighing;
+use fewbits_baselines::cfwmd::Weighing;
 
 /// The schemes of the publication, with and without regard to silence.
 pub(super) const FOUR: [(&str, Scheme); 4] = [

@@ -10,7 +10,7 @@ use super::scalar::{CENSORED, FOUR};
 use super::setting::{Linear, Setting};
 use super::world::Named;
 use crate::prelude::*;
-use fewbits_cfwmd::rule::Weighing;
+use fewbits_baselines::cfwmd::Weighing;
 
 /// The acceleration variance that the text states; the setting's own, 1, is the one that fits the printed table.
 const STATED: f64 = 4.0;

@@ -30,7 +30,8 @@ fn divergence(posterior: &Posterior, form: Form) -> Result<f64, Error> {
 fn lobes(posterior: &Posterior) -> Result<f64, Error> {
     let cells = &posterior.cells;
     let clumps = Clumps::new(&cells.columns(), &[&[], &[]], cells.weights(), 200)?;
-    let options = MixtureFit::new(2).and_then(|fit| fit.with_min_weight(0.05))?;
+    let mut options = MixtureFit::new(2)?;
+    options.min_weight = 0.05;
     let fit = clumps.fit(&options)?;
     let [a, b] = fit.components() else { return Ok(0.0) };
     let line = a.mean() - b.mean();

@@ -15,7 +15,7 @@ parameters! {
 
 impl Plant {
     pub(super) fn model(&self) -> Result<ScalarPlant, Error> {
-        Ok(ScalarPlant::with_noise_ratio(self.a, self.gamma)?)
+        Ok(ScalarPlant::new(self.a, self.gamma, 1.0)?)
     }
 
     /// Steady filtered variance of the Kalman filter.

@@ -38,7 +38,10 @@ impl Smoothing {
 
     /// The filter of the paper under this smoothing.
     pub(super) fn filter(self, particles: usize) -> Result<HandoffFilter<Whole>, Error> {
-        let filter = HandoffFilter::of_paper(particles, Whole)?;
+        let filter = HandoffFilter {
+            shrink: false,
+            ..HandoffFilter::new(particles, Whole)?
+        };
         Ok(match self {
             Self::Silverman => filter,
             Self::Preset => HandoffFilter {

@@ -81,7 +81,10 @@ fn run(particles: usize, stream: Stream) -> [f64; 3] {
     let mut belief = Gaussian::known(truth).unwrap();
     let mut own = OwnRecursion::new(&belief);
     let mut cloud = GaussianCloud::agreed(&belief, particles.max(1)).unwrap();
-    let rule = ResamplingRule::new(Resampling::Systematic, Schedule::Below(0.5));
+    let rule = ResamplingRule {
+        resampling: Resampling::Systematic,
+        schedule: Schedule::Below(0.5),
+    };
     let mut filter = RaoBlackwellised::new(rule, particles.max(1)).unwrap();
     let mut rng = stream.named("particles").fast_rng();
     let mut world = stream.named("world").rng();

@@ -3,7 +3,7 @@
 use super::{assert_agrees, assert_agrees_if_known, exact, trials};
 use fewbits_baselines::dymbo::first_message::first_message_value;
 use fewbits_baselines::dymbo::gap::{SmoothedGap, Twin, exact_filter};
-use fewbits_baselines::dymbo::{SignFilter, contours};
+use fewbits_baselines::dymbo::{SignFilter, contours, scalar_fixed_lag_variance, steady_state};
 use fewbits_core::factor::Levels;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Observed, Sensing, Sign};
 use fewbits_dymbo::{
@@ -11,9 +11,7 @@ use fewbits_dymbo::{
     steady,
 };
 use fewbits_experiments::Measured;
-use fewbits_filters::{
-    GaussianCloud, RaoBlackwellised, ResamplingRule, StateFilter, scalar_fixed_lag_variance, steady_state,
-};
+use fewbits_filters::{GaussianCloud, RaoBlackwellised, ResamplingRule, StateFilter};
 use fewbits_models::{LinearGaussian, LinearSensor, ScalarSensor};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, SMatrix, Vector1, Vector2};
@@ -21,7 +19,7 @@ use rand::RngExt;
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_2_PI};
 
 fn plant(gamma: f64) -> ScalarPlant {
-    ScalarPlant::with_noise_ratio(0.9, gamma).unwrap()
+    ScalarPlant::new(0.9, gamma, 1.0).unwrap()
 }
 
 /// Time averages of computed variance and squared error over 1000 steps of one run.
@@ -223,11 +221,7 @@ fn two_sensors_in_turn_are_worth_one_unquantized() {
 #[test]
 fn a_lag_of_four_beats_the_unquantized_filter_of_a_slow_plant() {
     let lags = [0, 1, 2, 3, 4, 5, 10, 20];
-    for plant in [
-        plant(0.5),
-        plant(0.05),
-        ScalarPlant::with_noise_ratio(0.99, 1.0).unwrap(),
-    ] {
+    for plant in [plant(0.5), plant(0.05), ScalarPlant::new(0.99, 1.0, 1.0).unwrap()] {
         let filter = DymboFilter::new(plant);
         let density = exact_filter(&plant, 40 + 10 * 4 + 20).unwrap();
         let name = format!("{} {}", plant.coefficient(), plant.process_variance());
@@ -379,7 +373,7 @@ fn vectors_lose_little_to_the_exact_posterior() {
 #[test]
 fn exact_loss_is_that_of_another_program() {
     for (a, gamma) in [(0.9, 0.5), (0.9, 1.0), (1.0, 1.0)] {
-        let loss = chain::true_loss(&ScalarPlant::with_noise_ratio(a, gamma).unwrap()).unwrap();
+        let loss = chain::true_loss(&ScalarPlant::new(a, gamma, 1.0).unwrap()).unwrap();
         assert_agrees(&format!("dymbo-loss/exact/{a} {gamma}"), exact(loss));
     }
 }

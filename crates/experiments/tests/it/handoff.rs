@@ -143,7 +143,7 @@ fn errors(setups: &[Setup], law: &[([i64; 2], f64)], stream: Stream) -> Result<V
         let filter = HandoffFilter {
             bandwidth,
             shrink: *shrink,
-            ..HandoffFilter::of_paper(PARTICLES, Whole)?
+            ..HandoffFilter::new(PARTICLES, Whole)?
         };
         let mut rng = stream.named("filter").indexed(*number).fast_rng();
         let mut known = prior()?;

@@ -323,7 +323,7 @@ impl Joint {
         counted: &[(&Slot, usize)],
         scalar: &dyn Fn(&Slot) -> Result<Option<Scalar>, Error>,
     ) -> Result<Option<Self>, Error> {
-        let (mut product, mut log_scale) = (Product::new(), 0.0);
+        let (mut product, mut log_scale) = (Product::default(), 0.0);
         for (slot, count) in counted {
             let Some(Scalar::Levels(levels)) = scalar(slot)? else {
                 // Values are exact one after the other.

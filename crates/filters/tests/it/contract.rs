@@ -207,8 +207,8 @@ fn a_bank_over_switching_worlds_weighs_them_by_evidence() {
         let motion = switching.over(seconds).unwrap();
         belief = filter.step(&mut rng, &*motion, &belief, &[&observed]).unwrap().0;
         for ((one, log), world) in alone.iter_mut().zip(&worlds) {
-            let (next, info) =
-                assumed_density::step(&*Evolution::over(world, seconds).unwrap(), one, &observed).unwrap();
+            let predicted = assumed_density::predict(&*Evolution::over(world, seconds).unwrap(), one);
+            let (next, info) = assumed_density::update_through(&predicted, &observed).unwrap();
             (*one, *log) = (next, *log + info.log_likelihood);
         }
     }

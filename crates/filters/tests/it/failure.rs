@@ -55,7 +55,10 @@ fn particle_filters() {
     let before = cloud();
     let mut belief = before.clone();
     for schedule in [Schedule::Always, Schedule::Below(0.9), Schedule::Never] {
-        let rule = ResamplingRule::new(Resampling::Systematic, schedule);
+        let rule = ResamplingRule {
+            resampling: Resampling::Systematic,
+            schedule,
+        };
         let mut filter = BootstrapFilter::new(rule, before.len()).unwrap();
         for never in &nevers::<1>() {
             impossible(filter.update(&mut rng, &mut belief, &[never]));
@@ -73,7 +76,10 @@ fn the_rao_blackwellised_filter() {
     let mut rng = Stream::new(1).fast_rng();
     let before = GaussianCloud::new(cloud(), [[2.0]].into()).unwrap();
     let mut belief = before.clone();
-    let rule = ResamplingRule::new(Resampling::Systematic, Schedule::Below(0.9));
+    let rule = ResamplingRule {
+        resampling: Resampling::Systematic,
+        schedule: Schedule::Below(0.9),
+    };
     let mut filter = RaoBlackwellised::new(rule, 100).unwrap();
     for never in &nevers::<1>() {
         impossible(filter.update(&mut rng, &mut belief, &[never]));

@@ -57,7 +57,8 @@ fn one_model_is_the_assumed_density_filter() {
         let sign = Sign::of(z, 0.1).unwrap();
         let factor = Levels::sign(sign, 0.1, 0.5, &fewbits_core::Link::PERFECT).unwrap();
         let observed = Observed::new(sensor, factor);
-        let (next, info) = assumed_density::step(&dynamics, &single, &observed).unwrap();
+        let predicted = assumed_density::predict(&dynamics, &single);
+        let (next, info) = assumed_density::update_through(&predicted, &observed).unwrap();
         let (mixture, imm) = step(&filter, &belief, &observed).unwrap();
         (single, belief) = (next, mixture);
         assert!((info.log_likelihood - imm).abs() < 1e-12);

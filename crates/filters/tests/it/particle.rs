@@ -7,8 +7,8 @@ use fewbits_core::{
 };
 use fewbits_filters::centre::{FusionCentre, Reporting, Slot};
 use fewbits_filters::{
-    BootstrapFilter, GuidedFilter, GuidedParticles, MomentFilter, Particles, Resampling, ResamplingRule, Schedule,
-    StateFilter, kalman,
+    BootstrapFilter, GuidedFilter, GuidedParticles, MomentFilter, Particles, ResamplingRule, Schedule, StateFilter,
+    kalman,
 };
 use fewbits_models::{Ar1, ContinuousLinear, LinearGaussian, LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::{Moments, Stream};
@@ -119,8 +119,11 @@ fn all_filters_agree_with_the_kalman_filter() {
     let scene = scene(STEPS);
     let (exact, log_likelihood) = scene.kalman();
     for kind in Kind::ALL {
-        for resampling in Resampling::ALL {
-            let filter = ResamplingRule::new(resampling, Schedule::Below(0.7));
+        for resampling in crate::resample::ALL {
+            let filter = ResamplingRule {
+                resampling,
+                schedule: Schedule::Below(0.7),
+            };
             let (mut x, mut v, mut spread, mut evidence) = <(Moments, Moments, Moments, Moments)>::default();
             for repeat in 0..8 {
                 let stream = Stream::new(5).named("kalman").indexed(repeat);
@@ -152,9 +155,9 @@ fn the_likelihood_estimate_is_unbiased_for_every_law() {
     let scene = scene(6);
     let (_, log_likelihood) = scene.kalman();
     for kind in Kind::ALL {
-        for resampling in Resampling::ALL {
+        for resampling in crate::resample::ALL {
             for schedule in [Schedule::Always, Schedule::Below(0.5)] {
-                let filter = ResamplingRule::new(resampling, schedule);
+                let filter = ResamplingRule { resampling, schedule };
                 let ratio: Moments = (0..1000)
                     .map(|repeat| {
                         let stream = Stream::new(8).named("unbiased").indexed(repeat);
@@ -227,7 +230,7 @@ fn quantizer_cells_run_through_the_filter() {
 fn censored_silence_and_loss_run_through_the_filter() {
     against_the_grid(|k| match k % 4 {
         0 => Value::scalar(1.0, NOISE).unwrap().into(),
-        1 => Constant::ONE.into(),
+        1 => Constant::new(1.0).unwrap().into(),
         _ => {
             let link = Link::lossy(0.2 * (k % 2) as f64).unwrap();
             Levels::silence(Cell::new(-0.2, 1.6).unwrap(), NOISE, &link)

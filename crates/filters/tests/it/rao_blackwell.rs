@@ -42,7 +42,7 @@ fn bits_cells_silence_and_loss_agree_with_the_grid() {
         sign(Sign::Above, 0.4, 0.2),
         Levels::certain(Cell::new(1.0, 1.5).unwrap(), 0.49).unwrap().into(),
         silence(0.0),
-        Constant::ONE.into(),
+        Constant::new(1.0).unwrap().into(),
         silence(0.3),
         sign(Sign::Below, 3.0, 0.0),
         Value::scalar(-0.3, 0.49).unwrap().into(),
@@ -51,7 +51,10 @@ fn bits_cells_silence_and_loss_agree_with_the_grid() {
     .map(|factor| Observed::new(sensor, factor));
     let (exact, evidence) = crate::on_a_grid(&dynamics, [0.5, 2.0], &sequence);
     let (mut mean, mut variance, mut ratio) = <(Moments, Moments, Moments)>::default();
-    let rule = ResamplingRule::new(Resampling::Systematic, Schedule::Below(0.5));
+    let rule = ResamplingRule {
+        resampling: Resampling::Systematic,
+        schedule: Schedule::Below(0.5),
+    };
     let mut filter = RaoBlackwellised::new(rule, 200).unwrap();
     for repeat in 0..60 {
         let mut rng = Stream::new(4).indexed(repeat).fast_rng();

@@ -33,7 +33,7 @@ proptest! {
             prop_assert!(!error.kl.is_nan() && !error.ml.is_nan(), "{:?}", error);
         }
         let few = Components { reduction: Reduction::paper(Criterion::Kl), components };
-        if let Ok(filter) = HandoffFilter::of_paper(particles, few)
+        if let Ok(filter) = HandoffFilter::new(particles, few).map(|filter| HandoffFilter { shrink: false, ..filter })
             && let Ok((handover, info)) = filter.step(&mut rng, &known, &walk, &seen)
         {
             prop_assert!(info.log_likelihood.is_finite() && handover.mixture().mean()[0].is_finite(), "{:?} {:?}", x, info);

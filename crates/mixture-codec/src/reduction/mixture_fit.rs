@@ -6,7 +6,7 @@ use crate::Error;
 use fewbits_core::Columns;
 use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::eigen::raised;
-use fewbits_numerics::error::{at_least_one, within};
+use fewbits_numerics::error::at_least_one;
 
 /// Settings of [`Clumps::fit`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,15 +34,6 @@ impl MixtureFit {
             iterations: 60,
             tolerance: 1e-4,
         })
-    }
-
-    /// The same settings with another least weight.
-    ///
-    /// # Errors
-    /// If `min_weight` is outside `[0, 1]`.
-    pub fn with_min_weight(self, min_weight: f64) -> Result<Self, Error> {
-        within("min_weight", min_weight, 0.0, 1.0)?;
-        Ok(Self { min_weight, ..self })
     }
 }
 
@@ -200,7 +191,6 @@ mod tests {
                     .amax()
                     < 1e-12
         );
-        assert!(MixtureFit::new(0).is_err() && MixtureFit::new(3).unwrap().with_min_weight(1.1).is_err());
-        assert_eq!(MixtureFit::new(3).unwrap().with_min_weight(0.3).unwrap().min_weight, 0.3);
+        assert!(MixtureFit::new(0).is_err());
     }
 }

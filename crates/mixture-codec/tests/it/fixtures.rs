@@ -137,7 +137,10 @@ fn the_tree_of_d1() {
     f.check("tree.d1.root_KL", errors[0].kl_plugin);
     f.check("tree.d1.root_L1", errors[0].l1_plugin);
     f.check("tree.d1.root_DR", errors[0].dr_plugin);
-    let whole = plug_in(&estimate, &Mixture::new(vec![root.component().unwrap()]).unwrap());
+    let whole = plug_in(
+        &estimate,
+        &Mixture::new(vec![Component::new(root.weight, root.mean, root.covariance).unwrap()]).unwrap(),
+    );
     assert!((whole.kl_plugin - errors[0].kl_plugin).abs() < 1e-12);
 }
 
@@ -195,7 +198,8 @@ fn pairs_on_a_line() {
         let estimate = KernelEstimate::new(particles, Matrix1::new(0.0625)).unwrap();
         let tree = Tree::new(&estimate, Split::KD).unwrap();
         f.check(&format!("pair.a{a}.h0.25.plug"), node_errors(&estimate, &tree).unwrap()[0].kl_plugin);
-        let node = Mixture::new(vec![tree.nodes()[0].component().unwrap()]).unwrap();
+        let root = &tree.nodes()[0];
+        let node = Mixture::new(vec![Component::new(root.weight, root.mean, root.covariance).unwrap()]).unwrap();
         f.check(&format!("pair.a{a}.h0.25.true"), integrated(&estimate.to_mixture().unwrap(), &node).unwrap().kl);
     }
 }

@@ -301,8 +301,10 @@ fn trees_are_cut_where_they_say_and_nodes_are_what_they_hold() {
             let own = members
                 .iter()
                 .map(|i| Component::new(weights[*i], point(*i), kernel).unwrap());
-            let (own, gaussian) =
-                (Mixture::new(own.collect()).unwrap(), Mixture::new(vec![node.component().unwrap()]).unwrap());
+            let (own, gaussian) = (
+                Mixture::new(own.collect()).unwrap(),
+                Mixture::new(vec![Component::new(node.weight, node.mean, node.covariance).unwrap()]).unwrap(),
+            );
             let ratios: Vec<(f64, f64)> = members
                 .iter()
                 .map(|i| (weights[*i] / weight, own.log_pdf(&point(*i)) - gaussian.log_pdf(&point(*i))))

@@ -93,7 +93,7 @@ impl Air {
     ///
     /// # Errors
     /// As [`Air::new`].
-    pub fn with_wind(&self, wind: Vector3<f64>) -> Result<Self, Error> {
+    pub(crate) fn with_wind(&self, wind: Vector3<f64>) -> Result<Self, Error> {
         Self::new(self.diffusivity, wind, self.ground)?.with_closest(self.closest)
     }
 
@@ -103,12 +103,12 @@ impl Air {
     }
 
     /// Wind, m/s.
-    pub fn wind(&self) -> &Vector3<f64> {
+    pub(crate) fn wind(&self) -> &Vector3<f64> {
         &self.wind
     }
 
     /// The shortest distance, m; shorter ones are replaced by it.
-    pub fn closest(&self) -> f64 {
+    pub(crate) fn closest(&self) -> f64 {
         self.closest
     }
 

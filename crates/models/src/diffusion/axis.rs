@@ -75,13 +75,8 @@ impl Axis {
     }
 
     /// Diffusivity, m^2/s.
-    pub fn diffusivity(&self) -> f64 {
+    pub(crate) fn diffusivity(&self) -> f64 {
         self.diffusivity
-    }
-
-    /// Wind along the coordinate, m/s.
-    pub fn wind(&self) -> f64 {
-        self.wind
     }
 
     /// Concentration at `field`, `age` seconds after a unit mass was released at `source`, per metre. Zero outside the walls,

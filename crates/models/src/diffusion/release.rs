@@ -25,14 +25,6 @@ pub struct Release {
 }
 
 impl Release {
-    /// A constant rate (kg/s) from the instant `start` (s) on.
-    ///
-    /// # Errors
-    /// If an argument is not finite, or the rate is negative.
-    pub fn from(start: f64, rate: f64) -> Result<Self, Error> {
-        Self::during(start, f64::INFINITY, rate)
-    }
-
     /// A constant rate (kg/s) between the instants `start` and `end` (s).
     ///
     /// # Errors

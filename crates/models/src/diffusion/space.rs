@@ -36,11 +36,6 @@ impl Space {
             Some(other) => refuse("diffusivity", other.diffusivity(), format!("{expected} on every axis")),
         }
     }
-
-    /// Wind, m/s.
-    pub fn wind(&self) -> Vector3<f64> {
-        Vector3::from_fn(|i, _| self.axes[i].wind())
-    }
 }
 
 impl ImpulseResponse for Space {

@@ -81,9 +81,7 @@ fn the_pole_is_cut_off_along_the_ray() {
     let ray = Vector3::new(0.48, 0.6, -0.64);
     for wind in [Vector3::zeros(), Vector3::new(7.0, -3.0, 2.0)] {
         let air = Air::new(1.4, wind, Ground::None).unwrap();
-        assert_eq!((air.closest(), air.wind()), (1e-3, &wind));
         let air = air.with_closest(0.2).unwrap();
-        assert_eq!(air.closest(), 0.2);
         let edge = air.concentration(&(ray * 0.2), &Vector3::zeros(), 3.0);
         close(air.concentration(&(ray * 0.05), &Vector3::zeros(), 3.0), edge, 1e-13);
         assert!(air.concentration(&(ray * 0.21), &Vector3::zeros(), 3.0) < edge);
@@ -107,9 +105,8 @@ fn the_pole_is_cut_off_along_the_ray() {
 #[test]
 fn axes_and_spaces_say_what_they_are() {
     let windy = |v| Axis::open(1.4).unwrap().with_wind(v, Flux::Total).unwrap();
-    assert_eq!((windy(0.7).wind(), windy(0.7).diffusivity()), (0.7, 1.4));
     let space = Space::new([windy(0.7), windy(-0.2), Axis::half_space(1.4, Wall::ABSORBING).unwrap()]).unwrap();
-    assert_eq!((space.wind(), space.diffusivity()), (Vector3::new(0.7, -0.2, 0.0), 1.4));
+    assert_eq!(space.diffusivity(), 1.4);
     assert!(Space::new([windy(0.7), windy(0.7), Axis::open(1.5).unwrap()]).is_err());
     assert!(windy(0.7).with_wind(f64::NAN, Flux::Total).is_err());
     // A Gaussian that the wind carries.
@@ -166,7 +163,7 @@ fn piecewise_rates_are_boxes() {
     ] {
         assert!((release.concentration(time, growth) - want).abs() < 1e-13, "{time}");
     }
-    let from = Release::from(0.3, 2.0).unwrap();
+    let from = Release::during(0.3, f64::INFINITY, 2.0).unwrap();
     assert!((from.concentration(1.5, growth) - 2.0 * 1.44).abs() < 1e-14);
     // What falls with the age would leave less than nothing.
     let during = Release::during(0.3, 0.9, 2.0).unwrap();

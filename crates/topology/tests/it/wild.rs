@@ -22,9 +22,7 @@ proptest! {
         all.extend(Deployment::grid(lower, upper, counts));
         for deployment in all {
             prop_assert!(deployment.positions().iter().all(|p| p.iter().all(|x| x.is_finite())), "{:?}", deployment);
-            if !deployment.is_empty() {
-                prop_assert!(deployment.nearest_to(&Vector2::new(x[5], x[6])) < deployment.len());
-            }
+            prop_assert!(deployment.nearest_to(&Vector2::new(x[5], x[6])) < deployment.len());
             if let Ok(graph) = Graph::within(deployment.positions(), x[7]) {
                 prop_assert_eq!(graph.components().sizes.iter().sum::<usize>(), deployment.len());
                 if let Ok(hops) = graph.hops_from(node) {
