@@ -3,7 +3,6 @@
 use crate::design_options::DesignOptions;
 pub(crate) use crate::fit_options::FitOptions;
 pub(crate) use crate::fleet_options::{CentreOptions, CheckOptions, SensorOptions};
-pub(crate) use crate::leak_options::LeakOptions;
 pub(crate) use crate::ranges_options::RangesOptions;
 pub(crate) use crate::recording_options::{CatOptions, RepackOptions, UnpackOptions};
 pub(crate) use crate::table_options::{BoundOptions, DialectOptions, ManyOptions, TableOptions};
@@ -380,4 +379,22 @@ mod tests {
             waiting.extend(command.get_subcommands().cloned());
         }
     }
+}
+
+#[derive(Args, Clone)]
+pub(crate) struct LeakOptions {
+    #[command(flatten)]
+    pub(crate) table: TableOptions,
+    /// Rooms, air, sensors and what is known of the leak, as TOML.
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) rooms: PathBuf,
+    /// Write only the last row.
+    #[arg(long)]
+    pub(crate) last: bool,
+    /// One JSON object per row instead of CSV, and the summary as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// File of the estimates. Default: standard output.
+    #[arg(long, short, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
 }

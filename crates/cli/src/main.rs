@@ -19,7 +19,6 @@ mod identity;
 mod info;
 mod input;
 mod interrupt;
-mod leak_options;
 mod link;
 mod live;
 mod look;

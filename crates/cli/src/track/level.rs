@@ -5,7 +5,7 @@ use super::hints::Turning;
 use super::instant::Instant;
 use super::later::Last;
 use super::meaning::Seat;
-use super::report::{BAND, Shown, cells, first_cell, first_name, summarise};
+use super::report::{BAND, Shown, cells, events, first_cell, first_name, summarise};
 use super::rhythm::Rhythm;
 use super::rows::Instants;
 use super::settings::Settings;
@@ -279,18 +279,6 @@ impl Run {
     }
 }
 
-fn text(step: &Step, names: &[String]) -> String {
-    let words: Vec<String> = step
-        .events
-        .iter()
-        .map(|(event, sensor)| match sensor {
-            Some(sensor) => format!("{} {event}", names[*sensor]),
-            None => (*event).to_owned(),
-        })
-        .collect();
-    words.join("; ")
-}
-
 /// First rows from which it is found which columns report less often than rows come.
 const RHYTHM_ROWS: usize = 200;
 
@@ -357,7 +345,7 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
             values.for_each(|number| run.measured.push((instant.seconds, value(number))));
         }
         let first = first_cell(&instants, instant.time.clone());
-        let events = text(&step, &instants.names);
+        let events = events(&step, &instants.names);
         if lag.is_some() {
             waiting.push(Some((first, step, events)));
         } else {

@@ -75,3 +75,16 @@ pub(super) fn cells(shown: Shown, first: Cell, estimate: &[(f64, f64)], step: &S
     ];
     std::iter::once(first).chain(estimates).chain(last).collect()
 }
+
+/// The events of a row, as its cell.
+pub(super) fn events(step: &Step, names: &[String]) -> String {
+    let words: Vec<String> = step
+        .events
+        .iter()
+        .map(|(event, sensor)| match sensor {
+            Some(sensor) => format!("{} {event}", names[*sensor]),
+            None => (*event).to_owned(),
+        })
+        .collect();
+    words.join("; ")
+}
