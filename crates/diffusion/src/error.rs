@@ -73,4 +73,12 @@ pub enum Error {
     },
 }
 
-impl Error {}
+impl Error {
+    /// The refused argument, if that is the error.
+    pub fn argument(&self) -> Option<&ArgumentError> {
+        match self {
+            Self::Argument(argument) => Some(argument),
+            _ => None,
+        }
+    }
+}
