@@ -5,20 +5,25 @@ use crate::error::{Outcome, refused};
 use crate::given::named;
 use crate::stored::{self, Reduced, maker};
 use crate::table::{Table, doubles};
-use arrow_array::{ArrayRef, Int64Array};
-use fewbits_diffusion::{Flow, Plan, PotentialFlow, Scheme, SensorField, StepControl, Transport};
+use arrow_array::{ArrayRef, Int64Array, StringArray};
+use fewbits_diffusion::{
+    Flow, LeakBelief, LeakPrior, Plan, PotentialFlow, Reading, Scheme, SensorField, StepControl, Transport,
+};
 use fewbits_diffusive::{Error, RateModel, RateRange, Search, SearchBox, SearchField, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_topology::{Deployment, Graph};
 use nalgebra::{Vector2, Vector3};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Largest number of cells of a plan, times its nodes and instants.
 const MOST_NUMBERS: usize = 1 << 27;
+
+/// Rates of the belief about rooms, those beyond the range by an error of the model among them.
+const RATES: usize = 84;
 
 /// A search for a source that releases a substance, by sensors on the ground, in open air or in rooms.
 ///
@@ -60,6 +65,13 @@ const MOST_NUMBERS: usize = 1 << 27;
 /// >>> found = rooms.run(samples, start=rooms.nearest((6.5, 4.5)), deviation=4.0)
 /// >>> bool(np.hypot(*(found.mean - source)) < 0.5)
 /// True
+///
+/// >>> named = plan.replace("..#...#", "kk#bbb#") + "\nk = kitchen\nb = bath"
+/// >>> rooms = fb.SourceSearch(
+/// ...     places, reach=1.6, instants=[60.0, 120.0], noise=0.3, diffusivity=0.05, rate=(0.5, 1.5), box=((0, 0), (8, 5)), plan=named, flow=0.05
+/// ... )
+/// >>> print(rooms.rooms({node: samples(node) for node in found.visited["node"]})["room"][0])
+/// kitchen
 #[pyclass(frozen, module = "fewbits")]
 pub(crate) struct SourceSearch {
     given: Setting,
@@ -306,6 +318,85 @@ impl SourceSearch {
             visited: Py::new(py, visited)?,
         })
     }
+
+    /// In rooms: the probability that the source is in each room of the plan, the likeliest first, given what nodes measured at the instants:
+    /// `samples` has their numbers and samples. The plan names rooms by characters and lines such as `k = kitchen`; air of no room is
+    /// "elsewhere". `model_error` is the relative error of what the model says that a node measures, one standard deviation; a known rate
+    /// is taken as known up to it too.
+    ///
+    /// Raises `fewbits.ArgumentError` if the search has no plan, or the samples do not fit.
+    #[pyo3(signature = (samples, *, model_error=0.1))]
+    fn rooms(
+        &self,
+        py: Python<'_>,
+        samples: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = named)] model_error: f64,
+    ) -> Outcome<Table> {
+        let Some(drawing) = &self.given.plan else {
+            return refused("plan", "not given", "the plan that has the rooms");
+        };
+        let Ok(samples) = samples.cast::<PyDict>() else {
+            return refused("samples", shown(samples), "a dictionary: nodes and the samples of each");
+        };
+        let positions = self.field.deployment().positions();
+        let (mut places, mut readings) = (Vec::new(), Vec::new());
+        for (node, measured) in samples {
+            let place = node.extract::<usize>().ok().and_then(|node| positions.get(node));
+            let Some(place) = place else {
+                return refused("samples", shown(&node), format!("0 to {}, a node", positions.len() - 1));
+            };
+            places.push(*place);
+            readings.push(crate::model::sized("samples", vector("samples", &measured)?, self.given.instants.len())?);
+        }
+        let rate = match self.given.rate {
+            RateModel::Known(rate) => [rate, rate],
+            RateModel::Joint(range) | RateModel::NodeWise(range) | RateModel::SampleWise(range) => {
+                // Its logarithm is uniform.
+                [range.low().max(1e-3 * range.high()), range.high()]
+            }
+        };
+        // Steps of a narrower range would be far smaller than the errors of the model.
+        let (middle, half) = ((rate[0] * rate[1]).sqrt(), 0.5 * (rate[1] / rate[0]).ln());
+        let rate = [-1.0, 1.0].map(|side: f64| middle * (side * half.max(model_error).max(0.01)).exp());
+        let prior = LeakPrior {
+            start: [0.0, 0.0],
+            rate,
+            model_error,
+            faults: 0.001,
+        };
+        let found = py.detach(|| -> Outcome<_> {
+            let given = &self.given;
+            let squares = (given.square, given.split);
+            within_memory(drawing, given.split, RATES * (readings.len() + 2))?;
+            let field = rooms(drawing, squares, given.diffusivity, given.flow, &places, &given.instants)?;
+            let mut belief = LeakBelief::new(field, &prior)?;
+            for (node, measured) in readings.iter().enumerate() {
+                for (time, value) in given.instants.iter().zip(measured) {
+                    belief.observe(node, *time, &Reading::Value(*value), given.noise)?;
+                }
+            }
+            Ok(belief.rooms(&Plan::parse(drawing)?)?)
+        })?;
+        let (names, probabilities): (Vec<String>, Vec<f64>) = found.into_iter().unzip();
+        Table::new(vec![
+            ("room".to_owned(), Arc::new(StringArray::from(names)) as ArrayRef),
+            ("probability".to_owned(), doubles(probabilities)),
+        ])
+    }
+}
+
+/// Refuses a plan whose cells have too many numbers, so many each.
+fn within_memory(plan: &str, split: usize, each: usize) -> Outcome<()> {
+    let squares = plan.chars().filter(|square| *square != '\n').count();
+    let numbers = [split, split, squares, each];
+    let numbers = numbers
+        .iter()
+        .try_fold(1_usize, |product, one| product.checked_mul(*one));
+    if numbers.is_none_or(|numbers| numbers > MOST_NUMBERS) {
+        let expected = format!("at most {MOST_NUMBERS} numbers, {each} a cell: the plan has {squares} squares");
+        return refused("split", split, expected);
+    }
+    Ok(())
 }
 
 /// What sensors at these places measure in rooms, at these ages of the source.
@@ -317,16 +408,7 @@ fn rooms(
     places: &[Vector2<f64>],
     ages: &[f64],
 ) -> Outcome<SensorField> {
-    let squares = plan.chars().filter(|square| *square != '\n').count();
-    let numbers = [split, split, squares, places.len().max(1), ages.len().max(1)];
-    let numbers = numbers
-        .iter()
-        .try_fold(1_usize, |product, one| product.checked_mul(*one));
-    if numbers.is_none_or(|numbers| numbers > MOST_NUMBERS) {
-        let expected =
-            format!("at most {MOST_NUMBERS} cells times nodes times instants: the plan has {squares} squares");
-        return refused("split", split, expected);
-    }
+    within_memory(plan, split, places.len().max(1).saturating_mul(ages.len().max(1)))?;
     let plan = Plan::parse(plan)?;
     let domain = plan.domain(square, split, 0.0)?;
     let wind = match flow {

@@ -69,6 +69,11 @@ def search():
     )
 
 
+def in_rooms():
+    setting = {"reach": 9.0, "instants": [5.0], "noise": 0.1, "diffusivity": 0.1, "rate": 1.0, "box": ((0, 0), (4, 2))}
+    return fb.SourceSearch([[0.5, 0.5], [3.5, 1.5]], plan="kk#bb\nkk.bb\nk = kitchen\nb = bath", flow=0.0, **setting)
+
+
 ANCHORS = {"A": (0.0, 0.0), "B": (9.0, 0.0), "C": (0.0, 9.0)}
 
 
@@ -156,6 +161,7 @@ CALLS = {
     ),
     "SourceSearch.nearest": (search().nearest, ["place"], []),
     "SourceSearch.concentration": (search().concentration, ["place", "source"], ["rate"]),
+    "SourceSearch.rooms": (in_rooms().rooms, ["samples"], ["model_error"]),
     "SourceSearch.run": (lambda *a, **k: search().run(*a, **{"start": 0, "deviation": 5.0, **k}), ["samples"], ["start", "deviation"]),
     "Table": (fb.Table, ["columns"], []),
     "plot": (fb.plot, ["table"], ["x", "y", "band"]),

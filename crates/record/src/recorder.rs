@@ -106,7 +106,7 @@ impl<W: Write> Recorder<W> {
     pub fn new(writer: W, schema: Schema) -> Self {
         Self {
             writer,
-            rows: Waiting::new(schema.columns.len()),
+            rows: Waiting::new(&schema),
             schema,
             header: None,
             next_tick: 0,

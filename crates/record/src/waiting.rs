@@ -11,16 +11,16 @@ use fewbits_block_codec::ArgumentError;
 pub(crate) struct Waiting {
     pub(crate) ticks: Vec<i64>,
     pub(crate) columns: Vec<Cells>,
-    /// Ranges of all rows so far, including those that were removed.
+    /// Unknown ranges of all rows so far, including those that were removed.
     pub(crate) ranges: Ranges,
 }
 
 impl Waiting {
-    pub(crate) fn new(columns: usize) -> Self {
+    pub(crate) fn new(schema: &Schema) -> Self {
         Self {
             ticks: Vec::new(),
-            columns: vec![Vec::new(); columns],
-            ranges: Ranges::new(columns),
+            columns: vec![Vec::new(); schema.columns.len()],
+            ranges: Ranges::new(schema),
         }
     }
 

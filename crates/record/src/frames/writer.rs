@@ -53,7 +53,7 @@ impl FrameWriter {
         Ok(Self {
             header: None,
             max_bytes,
-            rows: Waiting::new(columns),
+            rows: Waiting::new(&schema),
             next_trial: 1,
             has_sent: false,
             frames: 0,
