@@ -1,8 +1,10 @@
 //! Ranges of the columns so far, and the error bounds that follow from shares of them.
 
+use crate::block::Cells;
 use crate::bound::Bound;
 use crate::header::{Header, rounded_down};
 use crate::schema::Schema;
+use std::ops::Range;
 
 /// A block states its own bound if that exceeds the header's by this factor.
 const WIDER: f64 = 1.25;
@@ -47,6 +49,15 @@ impl Ranges {
     pub(crate) fn add(&mut self, row: &[Option<f64>]) {
         for (column, ends) in &mut self.0 {
             *ends = with(*ends, row[*column]);
+        }
+    }
+
+    /// Includes some rows of these columns.
+    pub(crate) fn extend(&mut self, columns: &[Cells], rows: Range<usize>) {
+        for (column, ends) in &mut self.0 {
+            *ends = columns[*column][rows.clone()]
+                .iter()
+                .fold(*ends, |ends, cell| with(ends, *cell));
         }
     }
 

@@ -244,3 +244,50 @@ fn blocks_that_are_missing_doubled_or_moved_are_told() {
         assert!(found.2 || is_right(&found, &truth), "{} blocks: {found:?}", blocks.len());
     }
 }
+
+/// Columns at once are the same recording as row by row, with gaps, NaN, a range that is not known, and batches that end within blocks.
+#[test]
+fn columns_at_once_are_the_rows_one_by_one() {
+    let share = Column::new("share", Bound::ShareOfRange(0.01)).unwrap();
+    for rows_per_block in [1, 64, 100, 4096] {
+        for has_ticks in [false, true] {
+            let time = schema(rows_per_block, 0);
+            let base = if has_ticks { time.time() } else { TimeBase::Numbered };
+            let mut columns = time.columns().to_vec();
+            columns.push(share.clone());
+            let schema = Schema::new(columns, base)
+                .unwrap()
+                .with_rows_per_block(rows_per_block)
+                .unwrap();
+            let rows: Vec<(i64, Cells)> = rows(301)
+                .into_iter()
+                .map(|(tick, mut row)| {
+                    row.push(row[0].map(|wave| 100.0 - wave * tick as f64));
+                    (tick, row)
+                })
+                .collect();
+            let new = || Recorder::new(Vec::new(), schema.clone()).with_identity(7);
+            let (mut one, mut all) = (new(), new());
+            for (tick, row) in &rows {
+                match has_ticks {
+                    true => one.push(*tick, row).unwrap(),
+                    false => one.push_next(row).unwrap(),
+                }
+            }
+            for batch in [&rows[..37], &rows[37..37], &rows[37..229], &rows[229..]] {
+                let ticks: Vec<i64> = batch.iter().map(|(tick, _)| *tick).collect();
+                let columns: Vec<Cells> = (0..4)
+                    .map(|column| batch.iter().map(|(_, row)| row[column]).collect())
+                    .collect();
+                all.push_columns(has_ticks.then_some(&ticks[..]), &columns).unwrap();
+                let (few, short) = (&columns[..3], [&columns[..3], &[vec![None]]].concat());
+                assert!(all.push_columns(None, few).is_err());
+                if !batch.is_empty() && batch.len() > 1 {
+                    assert!(all.push_columns(None, &short).is_err());
+                }
+            }
+            assert_eq!(one.next_tick(), all.next_tick());
+            assert_eq!(one.finish().unwrap(), all.finish().unwrap(), "{rows_per_block} {has_ticks}");
+        }
+    }
+}
