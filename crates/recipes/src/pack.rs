@@ -17,10 +17,16 @@ pub fn fill<W: Write>(
     watch: &mut Watch<'_>,
 ) -> Result<u64, Error> {
     let columns = recorder.schema().columns().len();
-    let mut rows = 0;
+    let (mut rows, mut row) = (0, Vec::with_capacity(columns));
     while let Some(batch) = source.next_batch().map_err(Error::Source)? {
         batch.check(columns)?;
-        recorder.push_columns(batch.ticks.as_deref(), &batch.columns)?;
+        for index in 0..batch.rows() {
+            batch.row(index, &mut row);
+            match &batch.ticks {
+                Some(ticks) => recorder.push(ticks[index], &row)?,
+                None => recorder.push_next(&row)?,
+            }
+        }
         rows += batch.rows() as u64;
         report(watch, rows)?;
     }

@@ -2,7 +2,6 @@
 
 use crate::block::Cells;
 use crate::error::Damage;
-use crate::ranges::{larger, smaller};
 use crate::wire::{Bytes, push_varint};
 
 /// Number, smallest, largest and mean of finite values. Gaps, NaN and infinities are left out.
@@ -48,7 +47,7 @@ impl Aggregate {
         let (mut sum, mut part) = (0.0, 0.0);
         let finite = values.filter(|value| value.is_finite());
         for value in finite {
-            (all.low, all.high) = (smaller(all.low, value), larger(all.high, value));
+            (all.low, all.high) = (all.low.min(value), all.high.max(value));
             part += value;
             all.count += 1;
             if all.count % PART == 0 {
@@ -78,7 +77,7 @@ impl Aggregate {
         }
         let count = self.count.saturating_add(other.count);
         let share = other.count as f64 / count as f64;
-        (self.low, self.high) = (smaller(self.low, other.low), larger(self.high, other.high));
+        (self.low, self.high) = (self.low.min(other.low), self.high.max(other.high));
         // Halves cannot overflow, whatever the values.
         let halves = 0.5 * other.mean - 0.5 * self.mean;
         let mean = self.mean + share * halves + share * halves;

@@ -93,7 +93,6 @@ pub(crate) fn decimal(value: f64, places: u8) -> Option<i64> {
 
 impl Promise {
     /// Whether `restored` is within the bound of `sample`; both are finite.
-    #[inline]
     pub(crate) fn holds(self, sample: f64, restored: f64, period: Option<f64>) -> bool {
         match self {
             Self::Exact => sample.to_bits() == restored.to_bits(),

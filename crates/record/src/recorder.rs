@@ -8,7 +8,6 @@ use crate::index::{self, BLOCKS_PER_SEGMENT, Entry, Segment};
 use crate::resume;
 use crate::schema::Schema;
 use crate::waiting::Waiting;
-use fewbits_block_codec::ArgumentError;
 use fewbits_block_codec::Effort;
 use std::fs::File;
 use std::io::Write;
@@ -107,7 +106,7 @@ impl<W: Write> Recorder<W> {
     pub fn new(writer: W, schema: Schema) -> Self {
         Self {
             writer,
-            rows: Waiting::new(&schema),
+            rows: Waiting::new(schema.columns.len()),
             schema,
             header: None,
             next_tick: 0,
@@ -182,48 +181,6 @@ impl<W: Write> Recorder<W> {
     /// As [`push`](Self::push).
     pub fn push_next(&mut self, row: &[Option<f64>]) -> Result<(), Error> {
         self.push(self.next_tick, row)
-    }
-
-    /// Adds rows column by column: the same as each of them by [`push`](Self::push), or without ticks by [`push_next`](Self::push_next), in less
-    /// time.
-    ///
-    /// # Errors
-    /// If the number of columns or of a column's cells is not that of the recording and of the other columns; nothing is added then. If a full
-    /// block cannot be written.
-    pub fn push_columns(&mut self, ticks: Option<&[i64]>, columns: &[Vec<Option<f64>>]) -> Result<(), Error> {
-        let rows = ticks.map_or_else(|| columns.first().map_or(0, Vec::len), <[i64]>::len);
-        self.rows.check(columns.len())?;
-        if let Some(column) = columns.iter().find(|column| column.len() != rows) {
-            let expected = format!("{rows} cells, one per row");
-            return Err(ArgumentError::new("columns", format!("{} cells", column.len()), expected).into());
-        }
-        let mut done = 0;
-        while done < rows {
-            if self.broken {
-                return Err(Error::Broken);
-            }
-            let full = self.schema.rows_per_block;
-            if self.rows.ticks.len() >= full {
-                self.write_block(Starts::Learned)?;
-            }
-            let end = rows.min(done + full - self.rows.ticks.len());
-            match ticks {
-                Some(ticks) => self.rows.ticks.extend_from_slice(&ticks[done..end]),
-                None => {
-                    let numbers = 0..(end - done) as i64;
-                    self.rows
-                        .ticks
-                        .extend(numbers.map(|row| self.next_tick.wrapping_add(row)));
-                }
-            }
-            self.rows.extend(columns, done..end);
-            self.next_tick = self.rows.ticks.last().map_or(0, |tick| tick.wrapping_add(1));
-            if self.rows.ticks.len() == full && self.header.is_some() {
-                self.write_block(Starts::Learned)?;
-            }
-            done = end;
-        }
-        Ok(())
     }
 
     /// Writes the rows so far as a block, even if it is not full, so that a reader can read them.

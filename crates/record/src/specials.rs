@@ -197,7 +197,7 @@ pub(crate) fn has_value(specials: &[Option<Special>], rows: usize) -> Vec<bool> 
 
 /// The cells of a column: values with the special cells inserted. An empty list means no special cells.
 pub(crate) fn merged(specials: &[Option<Special>], values: &[f64]) -> Vec<Option<f64>> {
-    if specials.is_empty() || specials.len() == values.len() && specials.iter().all(Option::is_none) {
+    if specials.is_empty() {
         return values.iter().copied().map(Some).collect();
     }
     let mut values = values.iter().copied();

@@ -84,14 +84,11 @@ impl Grid {
         // The nearest one, because the first tick may be off the grid by the tolerance.
         let block = (first + size.abs() / 2 * size.signum()).div_euclid(size);
         let block = u64::try_from(block).ok().filter(|b| i128::from(*b) < MAX_BLOCK)?;
-        // Between two ticks of 64 bits lie only such, so that sums and products that wrap are right.
-        let begin = self.tick(block, 0)?;
-        self.tick(block, ticks.len() - 1)?;
-        let fits = |(row, tick): (i64, &i64)| {
-            let on_grid = begin.wrapping_add(self.step.wrapping_mul(row));
-            on_grid.abs_diff(*tick) <= self.tolerance
+        let fits = |(row, tick): (usize, &i64)| {
+            self.tick(block, row)
+                .is_some_and(|on_grid| on_grid.abs_diff(*tick) <= self.tolerance)
         };
-        (0..).zip(ticks).all(fits).then_some(block)
+        ticks.iter().enumerate().all(fits).then_some(block)
     }
 }
 

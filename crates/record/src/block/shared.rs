@@ -92,8 +92,7 @@ pub(super) fn encode(
             continue;
         };
         let codec = codec.with_effort(effort);
-        let mut has_value: Vec<bool> = specials[column].iter().map(Option::is_none).collect();
-        has_value.resize(cells[column].len(), true);
+        let has_value: Vec<bool> = specials[column].iter().map(Option::is_none).collect();
         let written = |related: &[usize]| {
             let mut writer = writer.clone();
             let _ = others(&mut writer, column, related);

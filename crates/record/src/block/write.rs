@@ -36,12 +36,7 @@ fn encode_column(
     let column = before.len();
     let target = header.target(column, own);
     let start = header.start(column, own);
-    // None at all where no cell is special.
-    let is_plain = cells.iter().all(|cell| cell.is_some_and(f64::is_finite));
-    let mut specials: Specials = match is_plain {
-        true => Vec::new(),
-        false => cells.iter().map(|cell| Special::of(*cell)).collect(),
-    };
+    let mut specials: Specials = cells.iter().map(|cell| Special::of(*cell)).collect();
     let shared = may_share
         .then(|| shared::indices(header, column, cells, own, effort))
         .flatten();
@@ -55,7 +50,7 @@ fn encode_column(
             specials,
         };
     }
-    let has_value = specials::has_value(&specials, cells.len());
+    let has_value: Vec<bool> = specials.iter().map(Option::is_none).collect();
     let samples = aligned(cells, &has_value);
     let mut others = match effort {
         Effort::Thorough => related::columns(cells, before),
@@ -73,15 +68,12 @@ fn encode_column(
         others.clear();
     }
     // Samples whose restored value is outside the bound are stored in full.
-    if coded.broken > 0 {
-        specials.resize(cells.len(), None);
-        let mut values = samples.iter().zip(&coded.restored);
-        for special in specials.iter_mut().filter(|special| special.is_none()) {
-            if let Some((sample, value)) = values.next()
-                && !target.holds(*sample, *value)
-            {
-                *special = Some(Special::Whole(sample.to_bits()));
-            }
+    let mut values = samples.iter().zip(&coded.restored);
+    for special in specials.iter_mut().filter(|special| special.is_none()) {
+        if let Some((sample, value)) = values.next()
+            && !target.holds(*sample, *value)
+        {
+            *special = Some(Special::Whole(sample.to_bits()));
         }
     }
     let mut descriptor = coded.id as u8;

@@ -49,7 +49,6 @@ pub(crate) struct Target {
 }
 
 impl Target {
-    #[inline]
     pub(crate) fn holds(&self, sample: f64, restored: f64) -> bool {
         self.promise.holds(sample, restored, self.period)
     }

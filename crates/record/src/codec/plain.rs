@@ -3,7 +3,6 @@
 use super::Target;
 use crate::bound::Promise;
 use crate::error::Damage;
-use crate::ranges::{larger, smaller};
 
 pub(super) fn raw(samples: &[f64]) -> Vec<u8> {
     samples.iter().flat_map(|sample| sample.to_le_bytes()).collect()
@@ -24,7 +23,7 @@ pub(super) fn constant(samples: &[f64], target: &Target) -> Option<Vec<u8>> {
     let keeps = |value: f64| samples.iter().all(|sample| target.holds(*sample, value));
     let ends = samples
         .iter()
-        .fold((first, first), |(low, high), x| (smaller(low, *x), larger(high, *x)));
+        .fold((first, first), |(low, high), x| (low.min(*x), high.max(*x)));
     let middle = match target.promise {
         Promise::Within(delta) if target.period.is_none() && ends.1 - ends.0 <= 2.0 * delta => {
             ends.0 + 0.5 * (ends.1 - ends.0)

@@ -53,7 +53,7 @@ impl FrameWriter {
         Ok(Self {
             header: None,
             max_bytes,
-            rows: Waiting::new(&schema),
+            rows: Waiting::new(columns),
             next_trial: 1,
             has_sent: false,
             frames: 0,
