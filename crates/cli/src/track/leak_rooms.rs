@@ -85,6 +85,23 @@ impl Rooms {
             );
             return Err(Error::content(&file, problem));
         }
+        for Sensor {
+            name,
+            noise,
+            thresholds,
+            ..
+        } in &rooms.sensor
+        {
+            if !(*noise > 0.0 && noise.is_finite()) {
+                let problem = format_args!("noise = {noise} of `{name}`: a deviation above 0 is expected");
+                return Err(Error::content(&file, problem));
+            }
+            let is_rising = thresholds.windows(2).all(|pair| pair[0] < pair[1]);
+            if !(is_rising && thresholds.iter().all(|edge| edge.is_finite())) {
+                let problem = format_args!("thresholds = {thresholds:?} of `{name}`: increasing numbers are expected");
+                return Err(Error::content(&file, problem));
+            }
+        }
         Ok(rooms)
     }
 

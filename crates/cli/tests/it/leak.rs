@@ -103,6 +103,9 @@ fn what_cannot_be_is_refused_by_name() {
         ("[-600, 1800]", "[2700, 2800]", "before the last reading"),
         ("[0.1, 10.0]", "[10.0, 0.1]", "rate"),
         ("thresholds = [1.0, 4.0, 16.0]", "thresholds = [1.0, 4.0]", "s1 reports 3"),
+        ("[1.0, 4.0, 16.0]", "[1.0, 16.0, 4.0]", "thresholds = [1.0, 16.0, 4.0] of `s1`"),
+        ("noise = 0.5", "noise = 0.0", "noise = 0 of `k1`"),
+        ("noise = 0.5", "noise = inf", "noise = inf of `k1`"),
         ("#ssssss##cccccc#\n#", "#ssssss##ccccccc#\n#", "squares in line"),
     ] {
         assert!(rooms.contains(change), "{change}");

@@ -56,8 +56,6 @@ pub struct Slot {
     pub(super) prediction: i64,
 }
 
-impl Slot {}
-
 impl Replica {
     /// All zeros: memory before the first sample. [`restart`](Self::restart) makes it a replica.
     pub(crate) const UNSET: Self = Self {
