@@ -200,6 +200,11 @@ impl Table {
         Ok(self)
     }
 
+    /// Whether times are those of a day, without a date.
+    pub(crate) fn is_of_day(&self) -> bool {
+        self.table.is_of_day()
+    }
+
     /// [`fewbits_recipes::times::name`] of the columns of values.
     pub(crate) fn time_name(&self) -> String {
         times::name(&self.table, &self.names)
@@ -212,11 +217,8 @@ impl Table {
 
     /// What the column at an index of `names` holds.
     pub(crate) fn kind(&self, index: usize) -> Kind {
-        let column = self
-            .table
-            .selected()
-            .get(index)
-            .and_then(|column| self.table.columns().get(*column));
+        let place = self.table.selected().get(index);
+        let column = place.and_then(|column| self.table.columns().get(*column));
         column.map_or(Kind::Number, |column| column.kind)
     }
 
@@ -270,10 +272,8 @@ impl Table {
         let origins: Vec<Option<i64>> = (0..self.names.len())
             .map(|index| self.origin(index))
             .collect::<Result<_, _>>()?;
-        self.integers = origins
-            .into_iter()
-            .map(|origin| origin.map(Integers::from_origin))
-            .collect();
+        let code = |origin: Option<i64>| origin.map(Integers::from_origin);
+        self.integers = origins.into_iter().map(code).collect();
         Ok(self.integers.clone())
     }
 
@@ -314,11 +314,8 @@ impl Table {
             }
         }
         if skipped.repeated > 0 {
-            say!(
-                "{}: {} lines that repeat the names or the lines around them were left out",
-                self.file,
-                skipped.repeated
-            );
+            let (file, count) = (&self.file, skipped.repeated);
+            say!("{file}: {count} lines that repeat the names or the lines around them were left out");
         }
     }
 

@@ -116,7 +116,7 @@ fn text(look: &Look) -> String {
                 let more = if column.words.len() > SHOWN { ", ..." } else { "" };
                 let _ = write!(text, " ({}{more})", words.join(", "));
                 if column.kind == Kind::Words && fewbits_recipes::words::unit(&column.words).is_empty() {
-                    let _ = write!(text, "; too long for a recording, say --without {}", names::quoted(&name));
+                    let _ = write!(text, "; too long for a recording, say --without {}", names::as_argument([&name]));
                 }
             }
             _ => {}
@@ -138,7 +138,8 @@ fn text(look: &Look) -> String {
                 column.suspicious, column.kind
             );
             if column.suspicious == column.values {
-                let _ = writeln!(text, "  all of its cells: if it is text, say --without {}", names::quoted(&name));
+                let _ =
+                    writeln!(text, "  all of its cells: if it is text, say --without {}", names::as_argument([&name]));
             }
         }
         if let Some(value) = column.sentinel {

@@ -121,9 +121,9 @@ fn with_unit(table: &mut Table, index: usize, column: Column) -> Result<Column, 
 /// Refuses columns whose words do not fit a header.
 fn check_words(table: &Table) -> Result<(), Error> {
     let is_too_long = |i: &usize| table.kind(*i) == Kind::Words && table.unit(*i).is_empty();
-    let found: Vec<String> = (0..table.names.len())
+    let found: Vec<_> = (0..table.names.len())
         .filter(is_too_long)
-        .map(|i| names::quoted(&table.names[i]))
+        .map(|i| crate::say::name(&table.names[i]))
         .collect();
     if found.is_empty() {
         return Ok(());
@@ -131,7 +131,7 @@ fn check_words(table: &Table) -> Result<(), Error> {
     let problem = format!(
         "words of a column may have 1024 bytes together, and those of a pipe must stand in its first lines: leave such columns out \
          with --without {}",
-        crate::say::name(&found.join(","))
+        names::as_argument(found)
     );
     Err(Error::content(table.file(), problem))
 }

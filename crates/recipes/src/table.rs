@@ -179,7 +179,7 @@ fn cell_refused(
         column: name.to_owned(),
         cell: text,
         problem,
-        mend: mend.replace("--without", &format!("--without {}", names::quoted(name))),
+        mend: mend.replace("--without", &format!("--without {}", names::as_argument([name]))),
     }
 }
 

@@ -201,30 +201,16 @@ impl Dialect {
 
     /// The options of the command line that say this dialect.
     pub fn as_options(&self) -> String {
-        fn quoted(text: &str) -> String {
-            let is_plain = text
-                .bytes()
-                .all(|c| c.is_ascii_alphanumeric() || b",._-+/:%=".contains(&c))
-                && !text.is_empty();
-            if is_plain {
-                text.to_owned()
-            } else {
-                format!("'{}'", text.replace('\'', "'\\''"))
-            }
-        }
         fn list(names: &[String]) -> String {
-            let one = |name: &String| {
-                if name.contains(',') {
-                    format!("\"{name}\"")
-                } else {
-                    name.clone()
-                }
-            };
-            names.iter().map(one).collect::<Vec<_>>().join(",")
+            names
+                .iter()
+                .map(|name| names::quoted(name))
+                .collect::<Vec<_>>()
+                .join(",")
         }
         let mut options = Vec::new();
         let mut text = |option: &str, value: Option<String>| {
-            options.extend(value.map(|value| format!("{option} {}", quoted(&value))));
+            options.extend(value.map(|value| format!("{option} {}", names::in_shell(&value))));
         };
         text("--encoding", self.encoding.clone());
         text("--delimiter", self.delimiter.clone());

@@ -24,10 +24,10 @@ pub(crate) fn flattened(line: &str, number: u64) -> Result<Vec<(String, String)>
     if done { Ok(pairs) } else { Err(refused(reader.at)) }
 }
 
-/// The pairs of the only object, if it is a row: it has no lists of one length, one of them of times, which are columns.
-pub(crate) fn alone(pairs: Vec<(String, String)>) -> Result<Vec<(String, String)>, Error> {
+/// Whether the only object is a row: it has no lists of one length, one of them of times, which are columns.
+pub(crate) fn check_alone(pairs: &[(String, String)]) -> Result<(), Error> {
     let mut lists: Vec<(&str, usize)> = Vec::new();
-    for (key, _) in &pairs {
+    for (key, _) in pairs {
         let Some((name, _)) = key.rsplit_once('.').filter(|(_, index)| index.parse::<usize>().is_ok()) else {
             continue;
         };
@@ -45,17 +45,27 @@ pub(crate) fn alone(pairs: Vec<(String, String)>) -> Result<Vec<(String, String)
                    before it, or the like, if the lists stand in an object",
         });
     }
-    Ok(pairs)
+    Ok(())
 }
 
-/// A row of an object: a cell for each key.
-pub(crate) fn row(keys: &[String], row: &mut Row, found: &Line) -> Result<Option<()>, Error> {
+/// Names and texts of a line, whose number is given.
+pub(crate) type Pairs = fn(&str, u64) -> Result<Vec<(String, String)>, Error>;
+
+/// The keys of lines that name their cells, and what reads one.
+#[derive(Clone)]
+pub(crate) struct Keys {
+    pub(crate) keys: Vec<String>,
+    pub(crate) pairs: Pairs,
+}
+
+/// A row of a line that names its cells: a cell for each key.
+pub(crate) fn row(Keys { keys, pairs }: &Keys, row: &mut Row, found: &Line) -> Result<Option<()>, Error> {
     let Line::Text(line) = *found else {
         let (Line::Text(line) | Line::TooLong(line)) = *found;
         return Err(Error::Line {
             place: Place { line, row: 0 },
             problem: "too long".to_owned(),
-            mend: "one object stands on each line",
+            mend: "leave such lines out with --skip-bad",
         });
     };
     row.line = line;
@@ -65,7 +75,7 @@ pub(crate) fn row(keys: &[String], row: &mut Row, found: &Line) -> Result<Option
         row.cells.clear();
         return Ok(Some(()));
     }
-    let pairs = flattened(&text, line)?;
+    let pairs = pairs(&text, line)?;
     row.text.clear();
     for (key, value) in pairs {
         let Some(column) = keys.iter().position(|known| *known == key) else {

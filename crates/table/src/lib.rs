@@ -62,6 +62,7 @@ mod hint;
 mod interval;
 mod json;
 mod known;
+mod labelled;
 mod limits;
 mod lines;
 mod marks;

@@ -321,7 +321,7 @@ fn check_text(row: &Row) -> Result<(), Error> {
         Err(error) => Err(Error::Line {
             place: Place { line: row.line, row: 0 },
             problem: format!("byte {} is not text in UTF-8", error.valid_up_to() + 1),
-            mend: "say how it is written, as --encoding latin1",
+            mend: "say how it is written, as --encoding latin1, windows-1251, shift_jis or gbk",
         }),
     }
 }

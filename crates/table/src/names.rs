@@ -40,6 +40,22 @@ pub fn quoted(name: &str) -> String {
     }
 }
 
+/// Names as the argument of an option in a shell: a list, in the shell's quotes where it needs them.
+pub fn as_argument<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> String {
+    let names: Vec<String> = names.into_iter().map(|name| quoted(name.as_ref())).collect();
+    in_shell(&names.join(","))
+}
+
+/// A word in the quotes of a shell where it needs them.
+pub(crate) fn in_shell(word: &str) -> String {
+    let is_plain =
+        |c: char| c.is_ascii_alphanumeric() || ",._-+/:%=".contains(c) || !c.is_ascii() && !c.is_whitespace();
+    match !word.is_empty() && word.chars().all(is_plain) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', "'\\''")),
+    }
+}
+
 /// Index of a column by a name that a user wrote: the name, the name as the file has it if only one column has it, or `#3` for the third.
 pub(crate) fn find(names: &[String], own_names: &[String], wanted: &str) -> Option<usize> {
     let exact = names.iter().position(|name| name == wanted);
@@ -98,5 +114,8 @@ mod tests {
         assert_eq!(find(&names, &own, "A_3"), Some(2));
         assert_eq!(find(&names, &own, "#5"), Some(4));
         assert_eq!(find(&names, &own, "#6"), None);
+        assert_eq!(as_argument(["RH", "°C"]), "RH,°C");
+        assert_eq!(as_argument(["Temp, °F", "it's"]), "'\"Temp, °F\",it'\\''s'");
+        assert_eq!(split("\"Temp, °F\",it's"), ["Temp, °F", "it's"]);
     }
 }

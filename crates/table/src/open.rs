@@ -5,11 +5,12 @@ use crate::detect::{self, Layout};
 use crate::dialect::{Delimiter, Dialect};
 use crate::error::{Error, Place};
 use crate::head::{self, Head};
+use crate::json::{self, Keys, Pairs};
 use crate::lines::{Lines, Row, Split};
 use crate::profile::Profile;
 use crate::rows::Rows;
 use crate::table::Table;
-use crate::{json, known, names, source};
+use crate::{known, labelled, names, source};
 use std::io::{BufRead, Cursor, Read};
 
 impl Table {
@@ -39,14 +40,28 @@ impl Table {
                 mend: "make lines of its objects: jq -c '.[]' FILE | fewbits ... -",
             });
         }
+        if first == Some(b'[')
+            && said.delimiter.is_none()
+            && head.bytes.iter().filter(|c| !c.is_ascii_whitespace()).nth(1) == Some(&b'[')
+        {
+            return Err(Error::Format {
+                what: "JSON, a list of lists",
+                mend: "make a table of it: jq -r '.[] | @csv' FILE | fewbits ... --no-header -",
+            });
+        }
         if first == Some(b'<') {
             return Err(Error::Format {
                 what: "a page of HTML, or XML",
                 mend: "export the table as CSV",
             });
         }
+        let is_labelled = || {
+            said.delimiter.is_none() && said.no_header.is_none() && said.skip.is_none() && labelled::is_labelled(&head)
+        };
         let (rows, columns) = if is_object {
             of_json(&head, reader, &mut dialect)?
+        } else if is_labelled() {
+            of_keys(&head, reader, &mut dialect, "names before cells", labelled::pairs)?
         } else {
             of_text(&head, reader, &mut dialect, said)?
         };
@@ -60,28 +75,48 @@ fn lines_of(head: &Head, reader: Box<dyn BufRead + Send>) -> Lines {
 }
 
 fn of_json(head: &Head, reader: Box<dyn BufRead + Send>, dialect: &mut Dialect) -> Result<(Rows, Vec<Column>), Error> {
+    let lines: Vec<_> = filled(head).collect();
+    let Some((number, first)) = lines.first() else {
+        return Err(Error::Empty);
+    };
+    match json::flattened(first, *number) {
+        Ok(pairs) if lines.len() == 1 => json::check_alone(&pairs)?,
+        Err(_) if *number == 1 => {
+            return Err(Error::Format {
+                what: "JSON that is not one object a line",
+                mend: "make lines of its objects: jq -c . FILE | fewbits ... -",
+            });
+        }
+        _ => {}
+    }
+    dialect.decimal = Some('.');
+    of_keys(head, reader, dialect, "JSON lines", json::flattened)
+}
+
+/// Lines of the head with a text.
+fn filled(head: &Head) -> impl Iterator<Item = &(u64, String)> {
+    head.lines.iter().filter(|(_, line)| !line.trim().is_empty())
+}
+
+/// Rows of lines that name their cells.
+fn of_keys(
+    head: &Head,
+    reader: Box<dyn BufRead + Send>,
+    dialect: &mut Dialect,
+    format: &str,
+    pairs: Pairs,
+) -> Result<(Rows, Vec<Column>), Error> {
     let mut keys: Vec<String> = Vec::new();
-    let lines = || head.lines.iter().filter(|(_, line)| !line.trim().is_empty());
-    for (number, line) in lines() {
-        let pairs = match json::flattened(line, *number) {
-            Ok(pairs) if lines().nth(1).is_none() => json::alone(pairs)?,
-            Ok(pairs) => pairs,
-            Err(_) if *number > 1 => continue,
-            Err(_) => {
-                return Err(Error::Format {
-                    what: "JSON that is not one object a line",
-                    mend: "make lines of its objects: jq -c . FILE | fewbits ... -",
-                });
-            }
-        };
-        for (key, _) in pairs {
-            if !keys.contains(&key) {
-                keys.push(key);
-            }
+    for (key, _) in filled(head)
+        .filter_map(|(number, line)| pairs(line, *number).ok())
+        .flatten()
+    {
+        if !keys.contains(&key) {
+            keys.push(key);
         }
     }
-    dialect.format = Some("JSON lines".to_owned());
-    dialect.decimal = Some('.');
+    dialect.format = Some(format.to_owned());
+    dialect.decimal.get_or_insert('.');
     let columns = named(&keys, &[]);
     let rows = Rows {
         lines: lines_of(head, reader),
@@ -91,7 +126,7 @@ fn of_json(head: &Head, reader: Box<dyn BufRead + Send>, dialect: &mut Dialect) 
         },
         comment: Vec::new(),
         doubts_comments: false,
-        keys: Some(keys),
+        keys: Some(Keys { keys, pairs }),
         header: Vec::new(),
         preamble: Vec::new(),
     };
@@ -188,7 +223,7 @@ fn of_text(
                 row: 0,
             },
             problem: "the names are not text in UTF-8".to_owned(),
-            mend: "say how they are written, as --encoding latin1",
+            mend: "say how they are written, as --encoding latin1, windows-1251, shift_jis or gbk",
         });
     }
     rows.header.clone_from(&own_names);

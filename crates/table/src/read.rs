@@ -309,13 +309,12 @@ impl Table {
                     && self.columns[**other].kind == Kind::Number
                     && self.is_no_number(**other))
         };
-        let names: Vec<String> = self
+        let names = self
             .selected
             .iter()
             .filter(is_other)
-            .map(|i| names::quoted(&printable(&self.columns[*i].name)))
-            .collect();
-        let mend = mend.replace("--without", &format!("--without {}", names.join(",")));
+            .map(|i| printable(&self.columns[*i].name));
+        let mend = mend.replace("--without", &format!("--without {}", names::as_argument(names)));
         self.refused(column, cell, problem, mend)
     }
 

@@ -58,7 +58,7 @@ pub struct Readings {
 impl Readings {
     /// The options that make a column of each sensor.
     pub fn as_options(&self) -> String {
-        format!("--by {} --columns {}", names::quoted(&self.by), names::quoted(&self.value))
+        format!("--by {} --columns {}", names::as_argument([&self.by]), names::as_argument([&self.value]))
     }
 }
 

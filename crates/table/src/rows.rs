@@ -2,9 +2,10 @@
 
 use crate::dialect::{Delimiter, Dialect};
 use crate::error::{Error, Place};
+use crate::json::{self, Keys};
 use crate::lines::{Line, Lines, Row, Split};
+use crate::number;
 use crate::plain::Scanner;
-use crate::{json, number};
 #[cfg(feature = "parquet")]
 use std::io::Cursor;
 
@@ -18,8 +19,8 @@ pub(crate) struct Rows {
     pub(crate) comment: Vec<u8>,
     /// Whether a comment with as many cells as a row is refused, because it may be one.
     pub(crate) doubts_comments: bool,
-    /// Keys of objects, if lines are JSON, and whether others are ignored.
-    pub(crate) keys: Option<Vec<String>>,
+    /// Of lines that name their cells, as JSON does.
+    pub(crate) keys: Option<Keys>,
     pub(crate) header: Vec<String>,
     /// Cells of the lines before the data.
     pub(crate) preamble: Vec<Vec<String>>,

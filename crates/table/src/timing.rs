@@ -9,6 +9,7 @@ use crate::table::Table;
 use crate::time::Scale;
 #[cfg(feature = "parquet")]
 use crate::written::Clock;
+use crate::written::Syntax;
 
 impl Table {
     /// Takes the times of rows from these columns, which are then no columns of values.
@@ -194,6 +195,13 @@ impl Table {
         self.time
             .as_ref()
             .map(|(columns, clock)| (columns.as_slice(), clock.scale))
+    }
+
+    /// Whether times are those of a day, without a date, as `23:59`. Durations may be written alike.
+    pub fn is_of_day(&self) -> bool {
+        self.time
+            .as_ref()
+            .is_some_and(|(_, clock)| clock.syntax == Syntax::OfDay)
     }
 
     /// What the cells of a column of [`Kind::Time`](crate::Kind::Time) are measured from.

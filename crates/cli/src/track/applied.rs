@@ -5,6 +5,7 @@ use crate::arguments::{Model, TrackOptions};
 use crate::error::Error;
 use crate::say::say;
 use fewbits_filters::fit::SensorModel;
+use fewbits_table::names::quoted;
 use serde::{Deserialize, Serialize};
 
 /// What was found. Other fields of the file are for people.
@@ -73,13 +74,6 @@ pub(super) fn applied(options: &TrackOptions, names: &[String]) -> Result<(Track
     let text = std::fs::read_to_string(path).map_err(Error::io(&name, "read"))?;
     let found: Found = serde_json::from_str(&text)
         .map_err(|error| Error::content(&name, format_args!("it is no file of `fewbits fit -o`: {error}")))?;
-    let quoted = |name: &str| {
-        if name.contains([',', '=', '"']) {
-            format!("\"{}\"", name.replace('"', "\"\""))
-        } else {
-            name.to_owned()
-        }
-    };
     let mut corrections = Vec::new();
     let (mut noises, mut thresholds) = (Vec::new(), Vec::new());
     let is_there = |sensor: &&Sensor| names.is_empty() || names.contains(&sensor.name);

@@ -5,6 +5,7 @@ use crate::arguments::TrackOptions;
 use crate::error::Error;
 use crate::input::Table;
 use fewbits_table::Kind as Cells;
+use fewbits_table::names::as_argument;
 
 /// Names of a column that has the name of each row's sensor. Anchors may be numbers.
 const LABELS: [&str; 16] = [
@@ -155,7 +156,8 @@ impl Roles {
                 [] => {}
                 [name] if free.len() > 1 => {
                     found.told.push(format!(
-                        "{name} is taken for the accuracy of each row's values, as --accuracy-column {name} says; with --columns it is a sensor"
+                        "{name} is taken for the accuracy of each row's values, as --accuracy-column {} says; with --columns it is a sensor",
+                        as_argument([name])
                     ));
                     found.accuracy = Some((*name).clone());
                 }
@@ -180,9 +182,10 @@ impl Roles {
                 .filter(|i| !holds_words(table, **i) && Some(&table.names[**i]) != found.accuracy.as_ref());
             let values = values.filter(|i| !labels.contains(&&table.names[**i])).count();
             if let ([name], 1) = (labels.as_slice(), values) {
-                found
-                    .told
-                    .push(format!("each row is one reading of the sensor that {name} names, as --by {name} says"));
+                found.told.push(format!(
+                    "each row is one reading of the sensor that {name} names, as --by {} says",
+                    as_argument([name])
+                ));
                 found.by = Some((*name).clone());
             }
         }
@@ -231,7 +234,10 @@ impl Roles {
         } else {
             ""
         };
-        Some(format!("column {name} does not measure the level: say --without {name}{dilution}"))
+        Some(format!(
+            "column {name} does not measure the level: say --without {}{dilution}",
+            as_argument([&name])
+        ))
     }
 
     /// What to do with a column of words, if rows may be readings of the sensors that it names.
@@ -242,8 +248,9 @@ impl Roles {
         };
         let name = crate::say::name(&table.names[*column]);
         Some(format!(
-            "column `{name}` holds words, and numbers are expected: if it names the sensor of each row, say --by {name}; otherwise choose \
-             columns with --columns or --without, or name gaps with --missing"
+            "column `{name}` holds words, and numbers are expected: if it names the sensor of each row, say --by {}; otherwise choose \
+             columns with --columns or --without, or name gaps with --missing",
+            as_argument([&name])
         ))
     }
 }

@@ -54,6 +54,7 @@ mod report;
 mod rhythm;
 mod rows;
 mod samples;
+mod seconds;
 mod sensors;
 mod settings;
 mod stuck;

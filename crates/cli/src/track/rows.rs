@@ -6,19 +6,17 @@ use super::held::Held;
 use super::instant::{Instant, Qualifier, Reports};
 use super::late::Late;
 use super::samples::Samples;
+use super::seconds::Seconds;
 use super::transform::Transform;
 use crate::arguments::TableOptions;
 use crate::clock;
 use crate::error::Error;
 use crate::input::Table;
-use crate::say::say;
 use fewbits_record::TimeBase;
 use std::collections::VecDeque;
 
 /// Smallest number of seconds that is proposed for rows that come late.
 const LATE: f64 = 60.0;
-/// Times above these are not seconds since 1970 but fractions of a second: the number of them in one second.
-const PARTS_OF_A_SECOND: [(f64, f64); 3] = [(1e17, 1e9), (1e14, 1e6), (4e9, 1e3)];
 
 /// A table as instants.
 pub(super) struct Instants {
@@ -33,9 +31,7 @@ pub(super) struct Instants {
     pub(super) has_limits: bool,
     /// Places of the columns that are no sensors: accuracy, threshold.
     own: [Option<usize>; 2],
-    /// Seconds of a tick.
-    tick: f64,
-    first: Option<i64>,
+    seconds: Seconds,
     last: f64,
     next_number: i64,
     /// Names of the sensors so far.
@@ -115,10 +111,6 @@ impl Instants {
         if table.is_at_end()? {
             return Err(Error::empty(table.file(), "rows"));
         }
-        let tick = match base {
-            TimeBase::Clock { decimals, .. } => 0.1_f64.powi(i32::from(decimals)),
-            _ => 1.0,
-        };
         Ok(Self {
             names: if roles.by.is_some() { Vec::new() } else { sensors },
             is_long: roles.by.is_some(),
@@ -126,10 +118,9 @@ impl Instants {
             has_limits,
             is_filled: kind.is_filled,
             own,
+            seconds: Seconds::new(base, table.is_of_day()),
             table,
             base,
-            tick,
-            first: None,
             last: 0.0,
             next_number: 0,
             copies: 0,
@@ -319,11 +310,11 @@ impl Instants {
     }
 
     /// How late the latest row is, of one at this time and those that follow it. The rest of a pipe is not waited for.
-    fn latest(&mut self, seconds: f64, first: i64) -> f64 {
+    fn latest(&mut self, seconds: f64) -> f64 {
         let (mut newest, mut latest) = (self.last, self.last - seconds);
         if self.file() != "-" {
             while let Ok(Some((Some(tick), _))) = self.table.next(self.base) {
-                let seconds = (i128::from(tick) - i128::from(first)) as f64 * self.tick;
+                let seconds = self.seconds.since_first(tick);
                 newest = newest.max(seconds);
                 latest = latest.max(newest - seconds);
             }
@@ -337,22 +328,13 @@ impl Instants {
         };
         let tick = tick.unwrap_or(self.next_number);
         self.next_number = tick.wrapping_add(1);
-        if self.first.is_none() && self.has_time() {
-            let first = tick as f64 * self.tick;
-            if let Some((_, parts)) = PARTS_OF_A_SECOND.iter().find(|(above, _)| first.abs() > *above) {
-                say!("{}: times are taken as {parts:e} parts of a second", self.file());
-                self.tick /= parts;
-            }
-        }
-        let first = *self.first.get_or_insert(tick);
-        // The difference is taken in whole ticks: as nanoseconds since 1970, doubles are 256 apart.
-        let seconds = (i128::from(tick) - i128::from(first)) as f64 * self.tick;
+        let (row, may_be_late) = (self.table.row(), self.late.is_waiting());
+        let (tick, seconds) = self.seconds.of(tick, may_be_late, row, self.table.file());
         let time = clock::shown(tick, self.base);
-        if seconds < self.last && !self.late.is_waiting() {
-            let row = self.table.row();
+        if seconds < self.last && !may_be_late {
             let problem = format!(
                 "row {row}: time {time} is before that of the row above: sort the rows by time, or say how late rows may be, as --late {}s",
-                self.latest(seconds, first).ceil().max(LATE)
+                self.latest(seconds).ceil().max(LATE)
             );
             return Err(Error::content(self.file(), problem));
         }
@@ -379,7 +361,7 @@ impl Instants {
         };
         correct(&self.corrections, &mut reports, &self.names, seconds);
         if let Some(transform) = self.transform {
-            let wrong = |problem| Error::content(self.file(), format_args!("row {}: {problem}", self.table.row()));
+            let wrong = |problem| Error::content(self.file(), format_args!("row {row}: {problem}"));
             transform.apply(&mut reports, &self.names).map_err(wrong)?;
         }
         let qualifier = |place: &usize| Qualifier {
@@ -390,7 +372,7 @@ impl Instants {
         Ok(Some(Instant {
             seconds,
             time,
-            row: self.table.row(),
+            row,
             is_row: true,
             qualifiers: places.iter().map(qualifier).collect(),
             reports,

@@ -3,6 +3,7 @@
 use super::instant::Instant;
 use crate::say;
 use fewbits_numerics::Runs;
+use fewbits_table::names::as_argument;
 use std::collections::BTreeMap;
 
 /// Equal values in a row from which a sensor is told to be stuck, and others before it, at least.
@@ -110,7 +111,7 @@ impl Stuck {
             let mend = if repeats.is_apart(value) {
                 format!("that may mean a gap, as --missing '{name}={value}' says")
             } else {
-                format!("it may be stuck; --without {name} leaves it out")
+                format!("it may be stuck; --without {} leaves it out", as_argument([&name]))
             };
             Some(format!(
                 "{name} is {value} in {run} values in a row, which its values hardly ever repeat otherwise: {mend}"
@@ -123,8 +124,10 @@ impl Stuck {
             is_copy.then(|| {
                 format!(
                     "{other} has the value of {one} in {} of {} rows with a new one: if it is a copy, it counts as a second measurement; \
-                     --without {other} leaves it out",
-                    pair.equal, pair.rows
+                     --without {} leaves it out",
+                    pair.equal,
+                    pair.rows,
+                    as_argument([&other])
                 )
             })
         };

@@ -281,3 +281,47 @@ fn hints_name_what_no_option_says() {
     }
     assert!(summary(&two, &["--align", "200"]).contains("nothing says which is right"));
 }
+
+/// Times of day without a date give the estimates of dates: a row behind midnight was refused as one of the past.
+#[test]
+fn times_of_day_pass_midnight() {
+    let mut numbers = Numbers(77);
+    let truth = walk(&mut numbers, 200, 20.0, 0.1);
+    let values: Vec<String> = truth
+        .iter()
+        .map(|level| format!("{:.3}", level + 0.3 * numbers.normal()))
+        .collect();
+    // A row each quarter of an hour, and two midnights.
+    let table = |date: fn(usize) -> String| {
+        let clock = |row: usize| format!("{}{:02}:{:02}:00", date(row / 96), row % 96 / 4, row % 4 * 15);
+        let rows = values
+            .iter()
+            .enumerate()
+            .map(|(row, value)| format!("{},{value}\n", clock(row)));
+        rows.fold("time,x\n".to_owned(), |text, row| text + &row)
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let levels = |table: String, options: &[&str]| {
+        let words = [&["track", "-", "--json"], options].concat();
+        let out = text(&good(folder.path(), &words, table.as_bytes()));
+        let rows = out
+            .lines()
+            .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+        rows.map(|row| ["level", "level_low", "level_high"].map(|name| row[name].as_f64().unwrap()))
+            .collect::<Vec<_>>()
+    };
+    let dated = levels(table(|day| format!("2026-03-0{} ", day + 1)), &[]);
+    assert_eq!(dated.len(), 200);
+    assert_eq!(levels(table(|_| String::new()), &[]), dated);
+    // Rows that change places at midnight stay in their day.
+    let swapped = |table: String| {
+        let mut lines: Vec<&str> = table.lines().collect();
+        lines.swap(96, 97);
+        lines.join("\n") + "\n"
+    };
+    let late = &["--late", "1h"];
+    assert_eq!(
+        levels(swapped(table(|_| String::new())), late),
+        levels(swapped(table(|day| format!("2026-03-0{} ", day + 1))), late)
+    );
+}

@@ -291,3 +291,52 @@ fn marks_of_the_end_of_a_file_are_no_rows() {
         assert_eq!(rows(&mut table).rows, 2);
     }
 }
+
+/// As microcontrollers write for a plotter of the serial port, and services in their logs: the first line was taken for the names.
+#[test]
+fn cells_with_their_names_in_front() {
+    let found = |text: &str| {
+        let mut table = open_said(text, &Dialect::default()).unwrap();
+        table.find_certain_time().unwrap();
+        let names: Vec<String> = table
+            .selected()
+            .iter()
+            .map(|i| table.columns()[*i].name.clone())
+            .collect();
+        let batch = rows(&mut table);
+        (names, batch.columns.iter().map(numbers).collect::<Vec<_>>())
+    };
+    let expected = (
+        vec!["Temp".to_owned(), "Hum".to_owned()],
+        vec![
+            [20.1, 20.2, 20.3].map(Some).to_vec(),
+            [50.0, 51.0, 52.0].map(Some).to_vec(),
+        ],
+    );
+    for text in [
+        "Temp:20.1,Hum:50\nTemp:20.2,Hum:51\nTemp:20.3,Hum:52\n",
+        "Temp: 20.1\tHum: 50\nHum: 51\tTemp: 20.2\nTemp: 20.3\tHum: 52\n",
+        "Temp=20.1 Hum=50\r\nTemp=20.2 Hum=51\r\nTemp=20.3 Hum=52\r\n",
+        "12:00:01.5 -> Temp:20.1,Hum:50\n12:00:02.5 -> Temp:20.2,Hum:51\n12:00:03.5 -> Temp:20.3,Hum:52\n",
+        "time=2026-03-01T12:00:00Z Temp=20.1 Hum=50\ntime=2026-03-01T12:00:01Z Temp=20.2 Hum=51\n\ntime=2026-03-01T12:00:02Z Temp=20.3 Hum=52\n",
+    ] {
+        assert_eq!(found(text), expected, "{text}");
+    }
+    // A cell that is not there is a gap. A name that stands twice is refused, and so is a line without names.
+    let (_, columns) = found("a:1,b:2\na:3\na:4,b:5\n");
+    assert_eq!(columns[1], [Some(2.0), None, Some(5.0)]);
+    for line in ["a:1,a:2", "5"] {
+        let text = lines("a:1,b:2", 40, |_| "a:1,b:2".to_owned()) + line + "\n";
+        let error = refusal(&mut open_said(&text, &Dialect::default()).unwrap());
+        assert!(error.contains("line 42"), "{error}");
+    }
+    // A table with a line of names is one.
+    assert_eq!(found("name,value\na=1,2\na=2,3\n").0.len(), 2);
+}
+
+#[test]
+fn lists_of_lists_are_named() {
+    let lists = "[[1700000000,\"1.5\"],\n[1700000010,\"2.5\"]]\n";
+    let message = open_said(lists, &Dialect::default()).err().unwrap().to_string();
+    assert!(message.contains("a list of lists") && message.contains("jq"), "{message}");
+}

@@ -169,7 +169,7 @@ fn other_files_are_named() {
     // The option names the column.
     let many: String = (0..300).map(|i| format!("{i},text {i}\n")).collect();
     let mut table = open(&format!("time,\"a, b\"\n{many}"));
-    assert!(super::refusal(&mut table).contains("--without \"a, b\""));
+    assert!(super::refusal(&mut table).contains("--without '\"a, b\"'"));
     let mut table = open("time,x\n0,1\n1,2\n\0\0\0\x002,3\n3,4\n");
     assert!(super::refusal(&mut table).contains("NUL bytes"));
 }
