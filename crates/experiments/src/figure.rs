@@ -93,12 +93,7 @@ impl Context<'_> {
     /// A Monte-Carlo run on `stream` that reports progress and can be cancelled.
     pub fn monte_carlo(&self, stream: Stream, trials: u64) -> MonteCarlo<'_> {
         let mut run = MonteCarlo::new(stream, trials);
-        if let Some(progress) = self.progress {
-            run = run.with_progress(progress);
-        }
-        if let Some(cancel) = self.cancel {
-            run = run.with_cancellation(cancel);
-        }
+        (run.progress, run.cancel) = (self.progress, self.cancel);
         run
     }
 
