@@ -6,8 +6,6 @@ use fewbits_core::{Columns, ColumnsMut, Sensing};
 use fewbits_numerics::error::{finite, positive, refuse};
 use fewbits_numerics::kernels::vectorised;
 use nalgebra::{Matrix1, SMatrix, SVector, Vector1, Vector2};
-use rand::Rng;
-use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 /// `z = sqrt(P0 / (1 + alpha d^n)) + w`, `w ~ N(0, r)`, where `d` is the distance from the sensor to a source in the plane.
@@ -134,11 +132,6 @@ impl<const D: usize> Sensing<D, 1> for ReceivedPower<D> {
 
     fn noise_covariance_at(&self, _: &SVector<f64, D>) -> Matrix1<f64> {
         self.noise_covariance
-    }
-
-    fn sample(&self, rng: &mut dyn Rng, state: &SVector<f64, D>) -> Vector1<f64> {
-        let normal: f64 = StandardNormal.sample(rng);
-        self.mean(state) + Vector1::new(self.noise_variance().sqrt() * normal)
     }
 
     fn mean_columns(&self, states: &Columns<'_, D>, mut means: ColumnsMut<'_, 1>) {
