@@ -232,12 +232,8 @@ fn typed<F: Figure>(figure: &F, map: &Map<String, Json>) -> Result<F::Parameters
         (cost.seconds, Cost::LIMIT.seconds, "seconds on one core"),
     ] {
         if need.is_nan() || need > limit {
-            return Err(Error::TooLarge {
-                figure: id,
-                need,
-                limit,
-                unit,
-            });
+            let asked = format!("figure `{id}` would need about {need:.1e} {unit} at these settings");
+            return Err(Error::failed(format_args!("{asked}, beyond {limit:.1e}")));
         }
     }
     Ok(parameters)

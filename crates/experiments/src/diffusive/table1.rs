@@ -59,7 +59,7 @@ impl Figure for Table1 {
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let cross = p.correlation * (p.variance1 * p.variance2).sqrt();
         let precision = Matrix2::new(p.variance1, cross, cross, p.variance2).try_inverse();
-        let w = precision.ok_or(Error::Table("the covariance is singular".to_owned()))?;
+        let w = precision.ok_or_else(|| Error::failed("the covariance is singular"))?;
         let mean_of = |terms: &[([usize; 2], f64)]| -> Result<f64, Error> {
             let parts = terms
                 .iter()

@@ -8,6 +8,7 @@ use fewbits_filters::{GridFilter, Imm, MomentFilter, PointMassFilter, StateFilte
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
 use nalgebra::Vector1;
+use rand::RngExt;
 
 /// A sensor of which reading `sqrt(x^2 + 1)`: its posterior has two modes.
 #[derive(Debug, Clone, Copy)]
