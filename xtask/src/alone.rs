@@ -69,7 +69,7 @@ fn try_crate(package: &Package, root: &Path, target: &Path, options: &Options) -
             .env("CARGO_TARGET_DIR", target)
             .stdout(std::process::Stdio::null())
             .status();
-        status.map(|status| status.success()).map_err(Error::Cargo)
+        status.map(|status| status.success()).map_err(Error::cargo)
     };
 
     let mut good = true;

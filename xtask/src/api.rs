@@ -41,7 +41,7 @@ pub fn run(options: &Options) -> Result<bool, Error> {
     if options.check {
         cargo.arg("--check");
     }
-    Ok(cargo.status().map_err(Error::Cargo)?.success())
+    Ok(cargo.status().map_err(Error::cargo)?.success())
 }
 
 #[cfg(feature = "api")]
@@ -61,7 +61,7 @@ mod listing {
     /// If rustdoc fails or a file cannot be read or written.
     pub fn run(options: &Options) -> Result<bool, Error> {
         let metadata = MetadataCommand::new().no_deps().exec()?;
-        let me = std::env::current_exe().map_err(Error::Cargo)?;
+        let me = std::env::current_exe().map_err(Error::cargo)?;
         let rustdoc = std::env::var_os("RUSTDOC").unwrap_or_else(|| "rustdoc".into());
         let status = Command::new("cargo")
             .args(["doc", "--workspace", "--no-deps", "--lib", "--quiet"])
@@ -69,9 +69,9 @@ mod listing {
             .env(RUSTDOC, rustdoc)
             .env("RUSTDOCFLAGS", "-Z unstable-options --output-format json --cap-lints allow")
             .status()
-            .map_err(Error::Cargo)?;
+            .map_err(Error::cargo)?;
         if !status.success() {
-            return Err(Error::Rustdoc);
+            return Err(Error("rustdoc failed".to_owned()));
         }
         let folder = metadata.workspace_root.as_std_path().join("docs/api");
         std::fs::create_dir_all(&folder).map_err(Error::writing(&folder))?;
@@ -105,10 +105,8 @@ mod listing {
             .omit_auto_trait_impls(true)
             .omit_auto_derived_impls(true)
             .build();
-        let api = api.map_err(|source| Error::Description {
-            path: description.to_owned(),
-            source: Box::new(source),
-        })?;
+        let misfit = "the version of the crate `public-api` must fit the toolchain's";
+        let api = api.map_err(|source| Error(format!("{}: {source}; {misfit}", description.display())))?;
         Ok(api.items().map(|item| format!("{item}\n")).collect())
     }
 }

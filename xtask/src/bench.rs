@@ -40,14 +40,13 @@ pub fn run(options: &Options) -> Result<bool, Error> {
         let output = Command::new(env!("CARGO"))
             .args(["bench", "-q", "-p", &format!("fewbits-{name}"), "--benches"])
             .output()
-            .map_err(Error::Cargo)?;
+            .map_err(Error::cargo)?;
         if !output.status.success() {
             eprintln!("{}", String::from_utf8_lossy(&output.stderr));
             fine = false;
         }
-        let groups = parse(&String::from_utf8_lossy(&output.stdout)).map_err(|line| Error::Unread {
-            name: name.clone(),
-            line,
+        let groups = parse(&String::from_utf8_lossy(&output.stdout)).map_err(|line| {
+            Error(format!("the benchmarks of crate `{name}` ran, but their table was not understood: {line}"))
         })?;
         for group in groups {
             print(name, &group);

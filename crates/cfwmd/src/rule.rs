@@ -45,20 +45,9 @@ impl<const M: usize> CensoringRule<M> {
         Ok(Ellipsoid::new(innovation_covariance, threshold)?.into())
     }
 
-    /// Threshold `eta`.
-    pub fn threshold(&self) -> f64 {
-        self.region.threshold()
-    }
-
     /// The ellipsoid in which the innovation of a silent sensor lies.
     pub fn region(&self) -> &Ellipsoid<M> {
         &self.region
-    }
-
-    /// Normalised innovation squared `nu' S^-1 nu`.
-    #[inline]
-    pub fn statistic(&self, innovation: &SVector<f64, M>) -> f64 {
-        self.region.statistic(innovation)
     }
 
     /// Whether a sensor with this innovation sends.
@@ -68,7 +57,7 @@ impl<const M: usize> CensoringRule<M> {
             // The scalar rule compares with the half-width, because the fusion centre uses the same interval.
             fewbits_node::censor::reaches(innovation[0], self.half_width)
         } else {
-            self.statistic(innovation) >= self.threshold()
+            self.region.statistic(innovation) >= self.region.threshold()
         }
     }
 
@@ -78,16 +67,17 @@ impl<const M: usize> CensoringRule<M> {
     /// # Errors
     /// [`Error::Impossible`] if the rule would not have sent it.
     pub fn check(&self, innovation: &SVector<f64, M>, rounding: &SVector<f64, M>) -> Result<(), Error> {
-        let statistic = self.statistic(innovation);
+        let statistic = self.region.statistic(innovation);
         // By the triangle inequality, rounding moves the root of the statistic by at most the sum over the components.
         let slack: f64 = (0..M)
             .filter(|j| rounding[*j] > 0.0)
             .map(|j| {
-                self.statistic(&SVector::from_fn(|i, _| if i == j { rounding[j] } else { 0.0 }))
+                self.region
+                    .statistic(&SVector::from_fn(|i, _| if i == j { rounding[j] } else { 0.0 }))
                     .sqrt()
             })
             .sum();
-        if (statistic.sqrt() + slack).powi(2) < self.threshold() * (1.0 - 1e-9) {
+        if (statistic.sqrt() + slack).powi(2) < self.region.threshold() * (1.0 - 1e-9) {
             return Err(Error::Impossible);
         }
         Ok(())

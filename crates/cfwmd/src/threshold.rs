@@ -14,20 +14,8 @@ pub struct Budget {
     sensors: usize,
 }
 
-/// The stored form of [`Budget`].
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Numbers {
-    messages: f64,
-    sensors: usize,
-}
-
-impl TryFrom<Numbers> for Budget {
-    type Error = Error;
-
-    fn try_from(parts: Numbers) -> Result<Self, Error> {
-        Budget::new(parts.messages, parts.sensors)
-    }
+fewbits_numerics::stored_form! {
+    Numbers of Budget, Error; { messages: f64, sensors: usize } => Budget::new(messages, sensors)
 }
 
 impl Budget {

@@ -57,20 +57,8 @@ pub struct RangeNoise {
     relative: f64,
 }
 
-/// The stored form of [`RangeNoise`].
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Stored {
-    constant: f64,
-    relative: f64,
-}
-
-impl TryFrom<Stored> for RangeNoise {
-    type Error = Error;
-
-    fn try_from(parts: Stored) -> Result<Self, Error> {
-        RangeNoise::new(parts.constant, parts.relative)
-    }
+fewbits_numerics::stored_form! {
+    Stored of RangeNoise, Error; { constant: f64, relative: f64 } => RangeNoise::new(constant, relative)
 }
 
 impl RangeNoise {

@@ -1,8 +1,9 @@
 //! How the state is measured.
 
 use crate::columns::{Columns, ColumnsMut, count, measurements_agree, set_state, state_at};
-use nalgebra::{SMatrix, SVector};
-use rand::Rng;
+use nalgebra::{Cholesky, Const, SMatrix, SVector};
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
 
 /// Sensing with Gaussian noise, `z ~ N(h(x), R(x))`, `z` of `M` components.
 ///
@@ -18,8 +19,12 @@ pub trait Sensing<const D: usize, const M: usize>: Send + Sync {
     /// Noise covariance `R(x)`, positive definite.
     fn noise_covariance_at(&self, state: &SVector<f64, D>) -> SMatrix<f64, M, M>;
 
-    /// Draws a measurement of `state`.
-    fn sample(&self, rng: &mut dyn Rng, state: &SVector<f64, D>) -> SVector<f64, M>;
+    /// Draws a measurement of `state`; NaN where the covariance is not positive definite.
+    fn sample(&self, rng: &mut dyn Rng, state: &SVector<f64, D>) -> SVector<f64, M> {
+        let lower = Cholesky::<f64, Const<M>>::new(self.noise_covariance_at(state)).map(|factor| factor.l());
+        let normals = SVector::<f64, M>::from_fn(|_, _| rng.sample(StandardNormal));
+        self.mean(state) + lower.unwrap_or_else(|| SMatrix::repeat(f64::NAN)) * normals
+    }
 
     /// Periods of the components that are angles or the like, in the unit of the measurement; `None` for a number on the line.
     ///

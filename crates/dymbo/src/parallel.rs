@@ -47,22 +47,9 @@ pub struct ParallelFilter {
     link: Link,
 }
 
-/// The stored form of [`ParallelFilter`].
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Numbers {
-    plant: ScalarPlant,
-    sensors: usize,
-    fusion: CountFusion,
-    link: Link,
-}
-
-impl TryFrom<Numbers> for ParallelFilter {
-    type Error = Error;
-
-    fn try_from(parts: Numbers) -> Result<Self, Error> {
-        Ok(ParallelFilter::new(parts.plant, parts.sensors, parts.fusion)?.with_link(parts.link))
-    }
+fewbits_numerics::stored_form! {
+    Numbers of ParallelFilter, Error;
+    { plant: ScalarPlant, sensors: usize, fusion: CountFusion, link: Link } => Ok(ParallelFilter::new(plant, sensors, fusion)?.with_link(link))
 }
 
 impl ParallelFilter {

@@ -146,7 +146,7 @@ macro_rules! rows {
                 let first = to.described();
                 $(<$type as $crate::schema::Field>::describe(
                     $crate::Column::of(stringify!($field), concat!("" $(, $unit)?), $meaning)
-                        $(.drawn($crate::schema::roles::$role, concat!("" $(, $label)?), &[$(stringify!($panel)),*]))?,
+                        $(.drawn($crate::schema::Role::$role, concat!("" $(, $label)?), &[$(stringify!($panel)),*]))?,
                     to,
                 );)*
                 to.draw(first, row);

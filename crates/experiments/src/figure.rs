@@ -93,12 +93,7 @@ impl Context<'_> {
     /// A Monte-Carlo run on `stream` that reports progress and can be cancelled.
     pub fn monte_carlo(&self, stream: Stream, trials: u64) -> MonteCarlo<'_> {
         let mut run = MonteCarlo::new(stream, trials);
-        if let Some(progress) = self.progress {
-            run = run.with_progress(progress);
-        }
-        if let Some(cancel) = self.cancel {
-            run = run.with_cancellation(cancel);
-        }
+        (run.progress, run.cancel) = (self.progress, self.cancel);
         run
     }
 
@@ -237,12 +232,8 @@ fn typed<F: Figure>(figure: &F, map: &Map<String, Json>) -> Result<F::Parameters
         (cost.seconds, Cost::LIMIT.seconds, "seconds on one core"),
     ] {
         if need.is_nan() || need > limit {
-            return Err(Error::TooLarge {
-                figure: id,
-                need,
-                limit,
-                unit,
-            });
+            let asked = format!("figure `{id}` would need about {need:.1e} {unit} at these settings");
+            return Err(Error::failed(format_args!("{asked}, beyond {limit:.1e}")));
         }
     }
     Ok(parameters)

@@ -34,11 +34,9 @@ pub(crate) fn typed<P: DeserializeOwned + Argument + Quick>(
     map: &Map<String, Json>,
 ) -> Result<P, Error> {
     let json = Json::Object(map.clone());
-    let refuse = |Refusal { path, reason }| Error::Refused {
-        figure,
-        value: pointed(&json, &path).map(plain).unwrap_or_default(),
-        name: path,
-        reason,
+    let refuse = |Refusal { path, reason }| {
+        let value = pointed(&json, &path).map(plain).unwrap_or_default();
+        Error::refused(figure, &path, &value, reason)
     };
     let parameters: P = serde_path_to_error::deserialize(&json).map_err(|error| {
         refuse(Refusal {
@@ -81,24 +79,17 @@ pub(crate) fn set(
 ) -> Result<(), Error> {
     let Some(slot) = values.get_mut(name) else {
         let valid: Vec<_> = described.iter().map(|p| p.name.as_str()).collect();
-        return Err(Error::UnknownParameter {
-            figure,
-            name: name.to_owned(),
-            valid: if valid.is_empty() {
-                "none".to_owned()
-            } else {
-                valid.join(", ")
-            },
-        });
+        let valid = if valid.is_empty() {
+            "none".to_owned()
+        } else {
+            valid.join(", ")
+        };
+        let unknown = format!("figure `{figure}` has no parameter `{name}`");
+        return Err(Error::failed(format_args!("{unknown}: expected one of {valid}")));
     };
     let own = described.iter().find(|p| p.name == name);
     let entries = own.map_or(&[][..], |p| &p.entries);
-    let refused = |reason: &str| Error::Refused {
-        figure,
-        name: name.to_owned(),
-        value: text.to_owned(),
-        reason: reason.to_owned(),
-    };
+    let refused = |reason: &str| Error::refused(figure, name, text, reason);
     *slot = match slot {
         _ if text.trim_start().starts_with(['[', '{']) => {
             serde_json::from_str(text).map_err(|error| refused(&error.to_string()))?

@@ -20,7 +20,7 @@ pub fn plotted<T: Field>(tables: &T, title: &str, named: &[Named<'_>]) -> Plot {
         let pictures: Vec<Picture<'_>> = pictures.filter(Picture::is_drawn).collect();
         for value in pictures
             .first()
-            .map_or_else(Vec::new, |first| first.values_of(Role::Panel, &table.rows))
+            .map_or_else(Vec::new, |first| first.values_of(Role::panel, &table.rows))
         {
             for picture in &pictures {
                 let name = picture.named.0;
@@ -54,11 +54,11 @@ impl<'a> Picture<'a> {
         };
         // Words stand in their order, and so do the values of several columns together.
         let named = |row: &Vec<Value>| {
-            let mut cells = picture.cells(Role::X, row);
+            let mut cells = picture.cells(Role::x, row);
             matches!(cells.next(), Some((_, Value::Text(_)))) || cells.next().is_some()
         };
         if table.rows.iter().any(named) {
-            picture.places = picture.values_of(Role::X, &table.rows);
+            picture.places = picture.values_of(Role::x, &table.rows);
         }
         picture
     }
@@ -70,7 +70,7 @@ impl<'a> Picture<'a> {
                 [] => self.named.0.is_empty(),
                 panels => panels.contains(&self.named.0),
             };
-            here && matches!(column.role, Role::Line | Role::Dashed | Role::Points | Role::Curve)
+            here && matches!(column.role, Role::line | Role::dashed | Role::points | Role::curve)
         };
         let columns = self.table.columns.iter().enumerate();
         columns.filter(|(_, column)| is_drawn(column)).map(|(i, _)| i).collect()
@@ -78,7 +78,7 @@ impl<'a> Picture<'a> {
 
     /// Whether there is a horizontal axis and a column to draw.
     fn is_drawn(&self) -> bool {
-        self.table.columns.iter().any(|column| column.role == Role::X) && !self.drawn().is_empty()
+        self.table.columns.iter().any(|column| column.role == Role::x) && !self.drawn().is_empty()
     }
 
     /// The panel of one value of the panel columns.
@@ -89,7 +89,7 @@ impl<'a> Picture<'a> {
             ([], "") => title.to_owned(),
             (words, _) => words.join(", "),
         };
-        let mut panel = panel(title, self.named(Role::X));
+        let mut panel = panel(title, self.named(Role::x));
         if !self.places.is_empty() {
             panel.x = Axis::categories(panel.x.label, &self.places);
         }
@@ -100,7 +100,7 @@ impl<'a> Picture<'a> {
     /// Draws the rows of one value of the panel columns over what a panel has, in other colours.
     fn draw(&self, panel: &mut Panel, value: &str) {
         let rows = self.table.rows.iter();
-        let rows: Vec<_> = rows.filter(|row| self.value(Role::Panel, row) == *value).collect();
+        let rows: Vec<_> = rows.filter(|row| self.value(Role::panel, row) == *value).collect();
         let colours = panel.layers.iter().filter_map(|layer| layer.colour);
         let first = colours.max().map_or(0, |last| last + 1);
         let layers = self.layers(&rows).into_iter();
@@ -125,7 +125,7 @@ impl<'a> Picture<'a> {
         let mut words = Vec::new();
         while let Some((column, cell)) = cells.next() {
             let label = match (role, column.label.as_str()) {
-                (Role::X, _) | (_, "") => "{}",
+                (Role::x, _) | (_, "") => "{}",
                 (_, label) => label,
             };
             let mut word = label.replacen("{}", &cell.to_string(), 1);
@@ -152,7 +152,7 @@ impl<'a> Picture<'a> {
 
     fn layers(&self, rows: &[&Vec<Value>]) -> Vec<Layer> {
         let (columns, drawn) = (&self.table.columns, self.drawn());
-        let keys = crate::sweep::distinct(rows, |row| self.value(Role::Key, row));
+        let keys = crate::sweep::distinct(rows, |row| self.value(Role::key, row));
         // The line `Kalman, exact` and the marks `Kalman, simulated` have one colour.
         let mut kinds: Vec<(String, Vec<Role>)> = Vec::new();
         let colours = drawn.iter().map(|i| {
@@ -173,7 +173,7 @@ impl<'a> Picture<'a> {
         for (place, key) in keys.iter().enumerate() {
             let own: Vec<&[Value]> = rows
                 .iter()
-                .filter(|row| self.value(Role::Key, row) == *key)
+                .filter(|row| self.value(Role::key, row) == *key)
                 .map(|row| &row[..])
                 .collect();
             for (&i, &kind) in drawn.iter().zip(&colours) {
@@ -202,9 +202,9 @@ impl<'a> Picture<'a> {
         };
         let (points, errors): (Vec<_>, Vec<_>) = rows.iter().filter_map(mark).unzip();
         let layers = match columns[i].role {
-            Role::Line => vec![Layer::line(label, points)],
-            Role::Dashed => vec![Layer::dashed(label, points)],
-            Role::Curve => vec![
+            Role::line => vec![Layer::line(label, points)],
+            Role::dashed => vec![Layer::dashed(label, points)],
+            Role::curve => vec![
                 Layer::line("", points.clone()),
                 Layer::points(label, points).with_errors(errors),
             ],
@@ -215,9 +215,9 @@ impl<'a> Picture<'a> {
 
     fn place(&self, row: &[Value]) -> Option<f64> {
         if self.places.is_empty() {
-            return number(self.cells(Role::X, row).next()?.1);
+            return number(self.cells(Role::x, row).next()?.1);
         }
-        let own = self.value(Role::X, row);
+        let own = self.value(Role::x, row);
         let place = self.places.iter().position(|place| *place == own);
         place.map(|place| place as f64)
     }

@@ -29,40 +29,27 @@ pub struct Column {
     pub panels: &'static [&'static str],
 }
 
-/// What a column is in the default plot ([`plotted`](crate::plotted)). [`rows!`](crate::rows!) writes it behind the type of a field.
+/// What a column is in the default plot ([`plotted`](crate::plotted)), as [`rows!`](crate::rows!) writes it behind the type of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[allow(non_camel_case_types, reason = "words of a macro")]
 pub enum Role {
     /// Not drawn.
     #[default]
-    Data,
+    data,
     /// Each of its values has a panel.
-    Panel,
+    panel,
     /// The horizontal axis.
-    X,
+    x,
     /// Each of its values has a curve.
-    Key,
+    key,
     /// Drawn as a solid line.
-    Line,
+    line,
     /// Drawn as a dashed line: a bound or a reference.
-    Dashed,
+    dashed,
     /// Drawn as marks, with error bars where it is a [`Measured`].
-    Points,
+    points,
     /// Drawn as a line through marks.
-    Curve,
-}
-
-/// Roles as [`rows!`](crate::rows!) names them.
-#[doc(hidden)]
-#[allow(non_upper_case_globals, reason = "words of a macro")]
-pub mod roles {
-    use super::Role;
-    pub const panel: Role = Role::Panel;
-    pub const x: Role = Role::X;
-    pub const key: Role = Role::Key;
-    pub const line: Role = Role::Line;
-    pub const dashed: Role = Role::Dashed;
-    pub const points: Role = Role::Points;
-    pub const curve: Role = Role::Curve;
+    curve,
 }
 
 /// Which trial counts the references of a row need, as [`rows!`](crate::rows!) names them.
@@ -79,7 +66,7 @@ impl Column {
             name: name.trim_start_matches("r#").to_owned(),
             unit,
             meaning: on_one_line(documentation),
-            role: Role::Data,
+            role: Role::data,
             label: String::new(),
             panels: &[],
         }
@@ -166,7 +153,7 @@ impl Table {
                         && !number.is_finite()
                     {
                         let place = format!("column `{}`, row {index} of `{}`", column.name, table.name);
-                        return Err(Error::Table(format!("{number} in {place}")));
+                        return Err(Error::failed(format_args!("table: {number} in {place}")));
                     }
                 }
             }
@@ -201,7 +188,7 @@ impl Described {
     /// Gives the columns from `first` on, those of a row within a row, the role of that row.
     #[doc(hidden)]
     pub fn draw(&mut self, first: usize, row: Column) {
-        if row.role != Role::Data {
+        if row.role != Role::data {
             for column in &mut self.columns[first..] {
                 (column.role, column.panels) = (row.role, row.panels);
             }

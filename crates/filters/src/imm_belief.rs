@@ -17,21 +17,9 @@ pub struct ImmBelief<const D: usize> {
     pub(crate) modes: Vec<Gaussian<D>>,
 }
 
-/// The stored form of [`ImmBelief`].
-#[derive(Deserialize)]
-#[serde(rename = "ImmBelief")]
-#[serde(deny_unknown_fields)]
-struct Stored<const D: usize> {
-    probabilities: Vec<f64>,
-    modes: Vec<Gaussian<D>>,
-}
-
-impl<const D: usize> TryFrom<Stored<D>> for ImmBelief<D> {
-    type Error = ArgumentError;
-
-    fn try_from(parts: Stored<D>) -> Result<Self, ArgumentError> {
-        ImmBelief::new(parts.probabilities, parts.modes)
-    }
+fewbits_numerics::stored_form! {
+    #[serde(rename = "ImmBelief")]
+    Stored<const D> of ImmBelief<D>, ArgumentError; { probabilities: Vec<f64>, modes: Vec<Gaussian<D>> } => ImmBelief::new(probabilities, modes)
 }
 
 impl<const D: usize> ImmBelief<D> {

@@ -73,7 +73,7 @@ impl<const D: usize> StateFilter<D> for RaoBlackwellised<D> {
         belief: &mut GaussianCloud<D>,
     ) -> Result<(), Error> {
         // All particles share one covariance, since the Riccati recursion does not depend on the data.
-        let shared = Gaussian::from_trusted_parts(belief.means().mean(), *belief.shared_covariance());
+        let shared = Gaussian::from_trusted_parts(belief.means.mean(), belief.shared_covariance);
         let moved = dynamics.predict(&shared, 1.0);
         // Checked before resampling, so that a failed prediction leaves the belief as it was.
         if !moved.is_finite() {
@@ -81,9 +81,9 @@ impl<const D: usize> StateFilter<D> for RaoBlackwellised<D> {
                 what: "the predicted covariance",
             });
         }
-        self.rule.resample(rng, belief.means_mut(), &mut self.ancestors)?;
-        change_each(belief.means_mut().columns_mut(), |state| dynamics.mean(&state));
-        belief.set_shared_covariance(*moved.covariance());
+        self.rule.resample(rng, &mut belief.means, &mut self.ancestors)?;
+        change_each(belief.means.columns_mut(), |state| dynamics.mean(&state));
+        belief.shared_covariance = *moved.covariance();
         Ok(())
     }
 
@@ -93,7 +93,7 @@ impl<const D: usize> StateFilter<D> for RaoBlackwellised<D> {
         belief: &mut GaussianCloud<D>,
         observed: &[&dyn Likelihood<D>],
     ) -> Result<Info, Error> {
-        let mean = belief.means().mean();
+        let mean = belief.means.mean();
         let scalars = observed.iter().map(|one| one.as_linear_scalar(&mean));
         let Some(scalars) = scalars.collect::<Option<Vec<_>>>() else {
             return refuse("observed", "another likelihood", "scalar factors through linear sensors");
@@ -102,7 +102,7 @@ impl<const D: usize> StateFilter<D> for RaoBlackwellised<D> {
         next.clone_from(belief);
         let log_weights = &mut self.log_weights;
         log_weights.clear();
-        log_weights.resize(belief.means().len(), 0.0);
+        log_weights.resize(belief.means.len(), 0.0);
         // Impute one measurement per observation, one after the other; each adds to the log weights.
         for LinearScalar {
             matrix,
@@ -117,7 +117,7 @@ impl<const D: usize> StateFilter<D> for RaoBlackwellised<D> {
             })?;
         }
         // ln w += sum of ln p(observed | m) over the observations; normalise.
-        let info = weigh(next.means_mut(), |_, logs| {
+        let info = weigh(&mut next.means, |_, logs| {
             logs.iter_mut()
                 .zip(&*log_weights)
                 .for_each(|(log, added)| *log += added);
@@ -129,8 +129,8 @@ impl<const D: usize> StateFilter<D> for RaoBlackwellised<D> {
 
     /// Of more than 500 particles, 500 of equal weight.
     fn mixture(&self, belief: &GaussianCloud<D>) -> Option<Vec<(f64, Gaussian<D>)>> {
-        let (means, logs) = (belief.means(), belief.means().log_weights());
-        let of = |i: usize| Gaussian::from_trusted_parts(state_at(&means.columns(), i), *belief.shared_covariance());
+        let (means, logs) = (&belief.means, belief.means.log_weights());
+        let of = |i: usize| Gaussian::from_trusted_parts(state_at(&means.columns(), i), belief.shared_covariance);
         if logs.len() <= MAX_TESTED {
             return Some((0..logs.len()).map(|i| (logs[i], of(i))).collect());
         }
@@ -165,7 +165,7 @@ pub fn impute<const D: usize, const M: usize, R: Rng + ?Sized>(
     log_weights: &mut [f64],
     mut draw: impl FnMut(&mut R, &FactoredGaussian<M>, &SVector<f64, M>, &mut [f64]) -> (SVector<f64, M>, f64),
 ) -> Result<(), Error> {
-    let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
+    let shared = Gaussian::from_trusted_parts(SVector::zeros(), belief.shared_covariance);
     // One Kalman gain for all particles.
     let nothing = SVector::zeros();
     let innovation = nothing - matrix * shared.mean();
@@ -173,8 +173,8 @@ pub fn impute<const D: usize, const M: usize, R: Rng + ?Sized>(
     let innovation = Gaussian::from_trusted_parts(SVector::zeros(), info.innovation_covariance)
         .factored()
         .map_err(|_| Error::SingularInnovation)?;
-    let width = belief.means().auxiliary_width();
-    let (mut columns, side) = belief.means_mut().parts_mut();
+    let width = belief.means.auxiliary_width();
+    let (mut columns, side) = belief.means.parts_mut();
     for (i, log_weight) in log_weights.iter_mut().enumerate().take(count(&columns)) {
         let mean = state_at(&columns, i);
         let predicted = matrix * mean;
@@ -184,7 +184,7 @@ pub fn impute<const D: usize, const M: usize, R: Rng + ?Sized>(
         *log_weight += increment;
         set_state(&mut columns, i, &(mean + info.gain * (z - predicted)));
     }
-    belief.set_shared_covariance(*updated.covariance());
+    belief.shared_covariance = *updated.covariance();
     Ok(())
 }
 

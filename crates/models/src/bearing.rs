@@ -4,8 +4,6 @@ use crate::Error;
 use fewbits_core::Sensing;
 use fewbits_numerics::error::{all_finite, positive};
 use nalgebra::{Matrix1, RowVector2, Vector1, Vector2};
-use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
 use std::f64::consts::TAU;
 
 /// The direction from a sensor to a target in the plane, in Gaussian noise. It is periodic, so that residuals go the shorter way around.
@@ -88,11 +86,6 @@ impl Sensing<2, 1> for Bearing {
 
     fn noise_covariance_at(&self, _: &Vector2<f64>) -> Matrix1<f64> {
         Matrix1::new(self.noise_variance)
-    }
-
-    fn sample(&self, rng: &mut dyn Rng, at: &Vector2<f64>) -> Vector1<f64> {
-        let normal: f64 = rng.sample(StandardNormal);
-        self.mean(at) + Vector1::new(self.noise_variance.sqrt() * normal)
     }
 
     fn periods(&self) -> [Option<f64>; 1] {

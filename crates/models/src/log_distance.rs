@@ -4,8 +4,6 @@ use crate::Error;
 use fewbits_core::Sensing;
 use fewbits_numerics::error::{all_finite, finite, positive};
 use nalgebra::{Matrix1, SMatrix, SVector, Vector1};
-use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
 use std::f64::consts::LN_10;
 
 /// The log-distance model of received power: `level - 10 exponent log10(d) + w` in dBm at distance `d`, with shadowing `w ~ N(0, deviation^2)` in
@@ -82,10 +80,5 @@ impl<const D: usize> Sensing<D, 1> for LogDistance<D> {
 
     fn noise_covariance_at(&self, _: &SVector<f64, D>) -> Matrix1<f64> {
         Matrix1::new(self.noise_variance)
-    }
-
-    fn sample(&self, rng: &mut dyn Rng, at: &SVector<f64, D>) -> Vector1<f64> {
-        let normal: f64 = rng.sample(StandardNormal);
-        self.mean(at) + Vector1::new(self.noise_variance.sqrt() * normal)
     }
 }

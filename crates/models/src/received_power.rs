@@ -6,8 +6,6 @@ use fewbits_core::{Columns, ColumnsMut, Sensing};
 use fewbits_numerics::error::{finite, positive, refuse};
 use fewbits_numerics::kernels::vectorised;
 use nalgebra::{Matrix1, SMatrix, SVector, Vector1, Vector2};
-use rand::Rng;
-use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 /// `z = sqrt(P0 / (1 + alpha d^n)) + w`, `w ~ N(0, r)`, where `d` is the distance from the sensor to a source in the plane.
@@ -25,46 +23,13 @@ pub struct ReceivedPower<const D: usize> {
     noise_covariance: Matrix1<f64>,
 }
 
-/// The stored form of [`ReceivedPower`].
-#[derive(Serialize, Deserialize)]
-#[serde(rename = "ReceivedPower")]
-#[serde(deny_unknown_fields)]
-struct Parameters<const D: usize> {
-    #[serde(with = "fewbits_numerics::stored")]
-    position: Vector2<f64>,
-    axes: [usize; 2],
-    power: f64,
-    attenuation: f64,
-    exponent: f64,
-    noise_variance: f64,
-}
-
-impl<const D: usize> From<ReceivedPower<D>> for Parameters<D> {
-    fn from(sensor: ReceivedPower<D>) -> Self {
-        Self {
-            position: sensor.position,
-            axes: sensor.axes,
-            power: sensor.power,
-            attenuation: sensor.attenuation,
-            exponent: sensor.exponent,
-            noise_variance: sensor.noise_variance(),
-        }
-    }
-}
-
-impl<const D: usize> TryFrom<Parameters<D>> for ReceivedPower<D> {
-    type Error = Error;
-
-    fn try_from(parts: Parameters<D>) -> Result<Self, Error> {
-        ReceivedPower::new(
-            parts.position,
-            parts.axes,
-            parts.power,
-            parts.attenuation,
-            parts.exponent,
-            parts.noise_variance,
-        )
-    }
+fewbits_numerics::stored_form! {
+    #[serde(rename = "ReceivedPower")]
+    Parameters<const D> of ReceivedPower<D>, Error, as sensor;
+    {
+        #[serde(with = "fewbits_numerics::stored")]
+        position: Vector2<f64>, axes: [usize; 2], power: f64, attenuation: f64, exponent: f64, noise_variance: f64 = sensor.noise_variance()
+    } => ReceivedPower::new(position, axes, power, attenuation, exponent, noise_variance)
 }
 
 impl<const D: usize> ReceivedPower<D> {
@@ -167,11 +132,6 @@ impl<const D: usize> Sensing<D, 1> for ReceivedPower<D> {
 
     fn noise_covariance_at(&self, _: &SVector<f64, D>) -> Matrix1<f64> {
         self.noise_covariance
-    }
-
-    fn sample(&self, rng: &mut dyn Rng, state: &SVector<f64, D>) -> Vector1<f64> {
-        let normal: f64 = StandardNormal.sample(rng);
-        self.mean(state) + Vector1::new(self.noise_variance().sqrt() * normal)
     }
 
     fn mean_columns(&self, states: &Columns<'_, D>, mut means: ColumnsMut<'_, 1>) {

@@ -50,7 +50,7 @@ pub enum MonteCarloError {
         /// The panic's message.
         message: String,
     },
-    /// The run was cancelled ([`MonteCarlo::with_cancellation`]).
+    /// The run was cancelled ([`MonteCarlo::cancel`]).
     #[error("cancelled")]
     Cancelled,
     /// MPI ranks could not exchange their results.
@@ -80,8 +80,10 @@ pub enum MonteCarloError {
 pub struct MonteCarlo<'a> {
     stream: Stream,
     trials: u64,
-    progress: Option<&'a (dyn Fn(u64) + Sync)>,
-    cancel: Option<&'a AtomicBool>,
+    /// Called with the number of trials just finished, from any thread.
+    pub progress: Option<&'a (dyn Fn(u64) + Sync)>,
+    /// Once it is set, the run stops between trials.
+    pub cancel: Option<&'a AtomicBool>,
 }
 
 impl<'a> MonteCarlo<'a> {
@@ -92,22 +94,6 @@ impl<'a> MonteCarlo<'a> {
             trials,
             progress: None,
             cancel: None,
-        }
-    }
-
-    /// Calls `progress` with the number of trials just finished, from any thread.
-    pub fn with_progress(self, progress: &'a (dyn Fn(u64) + Sync)) -> Self {
-        Self {
-            progress: Some(progress),
-            ..self
-        }
-    }
-
-    /// Stops between trials once `cancel` is set.
-    pub fn with_cancellation(self, cancel: &'a AtomicBool) -> Self {
-        Self {
-            cancel: Some(cancel),
-            ..self
         }
     }
 

@@ -19,21 +19,9 @@ pub struct RangeSensor {
     noise: RangeNoise,
 }
 
-/// The stored form of [`RangeSensor`].
-#[derive(Deserialize)]
-#[serde(rename = "RangeSensor")]
-#[serde(deny_unknown_fields)]
-struct Place {
-    position: Vector2<f64>,
-    noise: RangeNoise,
-}
-
-impl TryFrom<Place> for RangeSensor {
-    type Error = Error;
-
-    fn try_from(parts: Place) -> Result<Self, Error> {
-        RangeSensor::new(parts.position, parts.noise)
-    }
+fewbits_numerics::stored_form! {
+    #[serde(rename = "RangeSensor")]
+    Place of RangeSensor, Error; { position: Vector2<f64>, noise: RangeNoise } => RangeSensor::new(position, noise)
 }
 
 impl RangeSensor {

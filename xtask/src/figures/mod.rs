@@ -96,7 +96,7 @@ fn merge(from: &[PathBuf], out: &Path, json: bool) -> Result<Ending, Error> {
         for record in Record::read_all(&folder)?.into_values() {
             if let Some(name) = record.damaged(&folder) {
                 let path = folder.join(name);
-                return Err(Error::Damaged { path });
+                return Err(Error(format!("{} is not as it was written: make the figure again", path.display())));
             }
             for name in record.files.iter().chain([&format!("{}.json", record.id)]) {
                 let path = folder.join(name);

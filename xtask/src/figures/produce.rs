@@ -25,7 +25,8 @@ impl<'a> Maker<'a> {
     pub(super) fn new(options: &'a Options) -> Result<Self, Error> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(options.threads.unwrap_or(0) as usize)
-            .build()?;
+            .build()
+            .map_err(|error| Error(format!("cannot start threads: {error}")))?;
         Ok(Self {
             options,
             pool,

@@ -16,17 +16,13 @@ pub(super) fn figures(patterns: &[String]) -> Result<Vec<&'static dyn AnyFigure>
     let figures = all();
     let mut chosen = vec![patterns.is_empty(); figures.len()];
     for pattern in patterns {
-        let glob = Glob::new(pattern).map_err(|error| Error::BadPattern {
-            pattern: pattern.clone(),
-            reason: error.kind().to_string(),
-        })?;
+        let glob =
+            Glob::new(pattern).map_err(|error| Error(format!("`{pattern}` is no valid pattern: {}", error.kind())))?;
         let (matcher, ids) = (glob.compile_matcher(), figures.iter().map(|figure| figure.about().id));
         let matching: Vec<bool> = ids.clone().map(|id| matcher.is_match(id)).collect();
         if !matching.contains(&true) {
-            return Err(Error::UnknownFigure {
-                pattern: pattern.clone(),
-                advice: advice(pattern, &ids.collect::<Vec<_>>()),
-            });
+            let advice = advice(pattern, &ids.collect::<Vec<_>>());
+            return Err(Error(format!("no figure matches `{pattern}`; {advice}")));
         }
         chosen.iter_mut().zip(matching).for_each(|(chosen, own)| *chosen |= own);
     }
@@ -57,7 +53,7 @@ pub(super) fn shard(figures: Vec<&'static dyn AnyFigure>, text: &str) -> Result<
         .split_once('/')
         .and_then(|(i, n)| Some((number(i)?, number(n)?)))
         .filter(|(i, n)| (1..=*n).contains(i))
-        .ok_or_else(|| Error::BadShard { text: text.to_owned() })?;
+        .ok_or_else(|| Error(format!("--shard {text}: expected I/N with I from 1 to N, such as 2/3")))?;
     Ok(figures.into_iter().skip(i - 1).step_by(n).collect())
 }
 
@@ -74,7 +70,7 @@ pub(super) fn configure(figures: &[&'static dyn AnyFigure], options: &Options) -
         let (name, value) = text
             .split_once('=')
             .filter(|(name, _)| !name.trim().is_empty())
-            .ok_or_else(|| Error::BadSetting { text: text.clone() })?;
+            .ok_or_else(|| Error(format!("--set {text}: expected NAME=VALUE")))?;
         settings.push((name.trim().to_owned(), value.to_owned()));
     }
     if let Some(trials) = options.trials {
@@ -84,16 +80,14 @@ pub(super) fn configure(figures: &[&'static dyn AnyFigure], options: &Options) -
         let known = figures.iter().any(|figure| has(*figure, &setting.0));
         if let (false, Some(first)) = (known, figures.first()) {
             // The figure's own refusal names the parameters it has.
-            first
-                .configure(std::slice::from_ref(setting), options.quick)
-                .map_err(Error::Setting)?;
+            first.configure(std::slice::from_ref(setting), options.quick)?;
         }
     }
     figures
         .iter()
         .map(|&figure| {
             let own: Vec<_> = settings.iter().filter(|(name, _)| has(figure, name)).cloned().collect();
-            let run = figure.configure(&own, options.quick).map_err(Error::Setting)?;
+            let run = figure.configure(&own, options.quick)?;
             Ok(Job { figure, run })
         })
         .collect()

@@ -96,7 +96,7 @@ impl Made {
         }
         if plots {
             if let Some(title) = blank(&outcome.plot) {
-                return Err(Error::Blank { title });
+                return Err(Error(format!("the plot shows nothing in its panel `{title}`")));
             }
             let svg = fewbits_plot::to_svg(&outcome.plot.clone().typeset())?;
             self.files.push((format!("{id}.svg"), svg));

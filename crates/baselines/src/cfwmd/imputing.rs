@@ -34,7 +34,7 @@ impl<const D: usize> ImputedBelief<D> {
     pub fn new(start: &Gaussian<D>, sensors: usize, particles: usize) -> Result<Self, Error> {
         let mut cloud = GaussianCloud::agreed(start, particles)?;
         let side = (0..particles * sensors * D).map(|c| start.mean()[c % D]).collect();
-        *cloud.means_mut() = cloud.means().clone().with_auxiliary(side)?;
+        cloud.means = cloud.means.clone().with_auxiliary(side)?;
         Ok(Self {
             own: vec![OwnRecursion::new(start); sensors],
             cloud,
@@ -89,14 +89,14 @@ where
         resampling: Resampling::Systematic,
         schedule: Schedule::Below(0.5),
     };
-    RaoBlackwellised::new(rule, next.cloud.means().len())?.predict(&mut &mut *rng, dynamics, &mut next.cloud)?;
-    for estimate in next.cloud.means_mut().parts_mut().1.chunks_exact_mut(D) {
+    RaoBlackwellised::new(rule, next.cloud.means.len())?.predict(&mut &mut *rng, dynamics, &mut next.cloud)?;
+    for estimate in next.cloud.means.parts_mut().1.chunks_exact_mut(D) {
         let moved = dynamics.transition() * SVector::<f64, D>::from_column_slice(estimate);
         estimate.copy_from_slice(moved.as_slice());
     }
     let steps = advance(&mut next.own, network, dynamics)?;
     let (link, loss) = (network.link(), network.link().loss());
-    let mut log_weights = vec![0.0; next.cloud.means().len()];
+    let mut log_weights = vec![0.0; next.cloud.means.len()];
     let sensors = || network.sensors().iter().zip(&steps).zip(observations).enumerate();
     // Values first: the withheld measurements are then drawn given them.
     for received in [true, false] {
@@ -114,7 +114,8 @@ where
                     let predicted = sensor.matrix() * SVector::<f64, D>::from_column_slice(own);
                     let (z, log_weight) = match observation {
                         Observation::Received(z) => {
-                            let clash = rule.statistic(&(z - predicted)) < rule.threshold() * (1.0 - 1e-9);
+                            let clash =
+                                rule.region().statistic(&(z - predicted)) < rule.region().threshold() * (1.0 - 1e-9);
                             contradicted += usize::from(clash);
                             (*z, innovation.log_pdf(&(z - central)) + if clash { VIOLATION } else { 0.0 })
                         }
@@ -130,7 +131,7 @@ where
             next.violations += usize::from(received && contradicted == log_weights.len());
         }
     }
-    let increment = next.cloud.means_mut().reweigh(|_, logs| {
+    let increment = next.cloud.means.reweigh(|_, logs| {
         logs.iter_mut()
             .zip(&log_weights)
             .for_each(|(log, increment)| *log += increment);
@@ -216,7 +217,7 @@ fn impute_sent<const M: usize, R: Rng + ?Sized>(
     }
     let scale = if rng.random::<bool>() { 1.0 } else { WIDER };
     let z = central + noise(rng, innovation) * scale;
-    if rule.statistic(&(z - own)) < rule.threshold() {
+    if rule.region().statistic(&(z - own)) < rule.region().threshold() {
         return (z, VIOLATION);
     }
     // q = (N(z; central, S) + N(z; central, WIDER^2 S)) / 2.
@@ -308,7 +309,7 @@ mod tests {
         });
         let weighed = means(|| {
             let z = central + noise(&mut rng, innovation);
-            let withheld = rule.statistic(&(z - own)) < rule.threshold();
+            let withheld = rule.region().statistic(&(z - own)) < rule.region().threshold();
             features(&z, loss + if withheld { 1.0 - loss } else { 0.0 })
         });
         for (k, (a, b)) in imputed.iter().zip(&weighed).enumerate() {

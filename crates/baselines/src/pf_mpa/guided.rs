@@ -32,19 +32,8 @@ pub struct GuidedGaussian {
     draws: usize,
 }
 
-/// The stored form of [`GuidedGaussian`].
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Stored {
-    draws: usize,
-}
-
-impl TryFrom<Stored> for GuidedGaussian {
-    type Error = Error;
-
-    fn try_from(parts: Stored) -> Result<Self, Error> {
-        GuidedGaussian::new(parts.draws)
-    }
+fewbits_numerics::stored_form! {
+    Stored of GuidedGaussian, Error; { draws: usize } => GuidedGaussian::new(draws)
 }
 
 /// Buffers that are reused from step to step.

@@ -31,19 +31,8 @@ pub struct RaoBlackwellGuided {
     particles: usize,
 }
 
-/// The stored form of [`RaoBlackwellGuided`].
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Stored {
-    particles: usize,
-}
-
-impl TryFrom<Stored> for RaoBlackwellGuided {
-    type Error = Error;
-
-    fn try_from(parts: Stored) -> Result<Self, Error> {
-        RaoBlackwellGuided::new(parts.particles)
-    }
+fewbits_numerics::stored_form! {
+    Stored of RaoBlackwellGuided, Error; { particles: usize } => RaoBlackwellGuided::new(particles)
 }
 
 impl RaoBlackwellGuided {

@@ -162,7 +162,7 @@ impl<const D: usize> JointBelief<D> {
         let spread = symmetrised(&(&rows * rows.transpose()));
         if spread.amax() <= NEGLIGIBLE * covariance.amax() {
             rule.check(&mu, &(value * 6e-8).abs())?;
-        } else if rule.threshold() > 0.0 {
+        } else if rule.region().threshold() > 0.0 {
             let inside = rule.region().under(&spread)?.moments(&mu);
             let p = inside.map_or(0.0, |inside| inside.log_mass.exp());
             // Rounding may give p = 1. The report is then improbable, not impossible.

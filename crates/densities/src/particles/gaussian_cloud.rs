@@ -14,27 +14,21 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored<D>")]
 pub struct GaussianCloud<const D: usize> {
-    means: Particles<D>,
-    #[serde(with = "fewbits_numerics::stored")]
-    covariance: SMatrix<f64, D, D>,
+    /// The conditional means with their weights.
+    pub means: Particles<D>,
+    /// The covariance that all particles share. What changes it must keep it symmetric positive semidefinite.
+    #[serde(rename = "covariance", with = "fewbits_numerics::stored")]
+    pub shared_covariance: SMatrix<f64, D, D>,
 }
 
-/// The stored form of [`GaussianCloud`].
-#[derive(Deserialize)]
-#[serde(rename = "GaussianCloud")]
-#[serde(deny_unknown_fields)]
-struct Stored<const D: usize> {
-    means: Particles<D>,
-    #[serde(with = "fewbits_numerics::stored")]
-    covariance: SMatrix<f64, D, D>,
-}
-
-impl<const D: usize> TryFrom<Stored<D>> for GaussianCloud<D> {
-    type Error = Error;
-
-    fn try_from(parts: Stored<D>) -> Result<Self, Error> {
-        GaussianCloud::new(parts.means, parts.covariance)
-    }
+fewbits_numerics::stored_form! {
+    #[serde(rename = "GaussianCloud")]
+    Stored<const D> of GaussianCloud<D>, Error;
+    {
+        means: Particles<D>,
+        #[serde(with = "fewbits_numerics::stored")]
+        covariance: SMatrix<f64, D, D>
+    } => GaussianCloud::new(means, covariance)
 }
 
 impl<const D: usize> GaussianCloud<D> {
@@ -43,8 +37,11 @@ impl<const D: usize> GaussianCloud<D> {
     /// # Errors
     /// If `covariance` is not symmetric positive semidefinite.
     pub fn new(means: Particles<D>, covariance: SMatrix<f64, D, D>) -> Result<Self, Error> {
-        let covariance = *Gaussian::new(SVector::zeros(), covariance)?.covariance();
-        Ok(Self { means, covariance })
+        let shared_covariance = *Gaussian::new(SVector::zeros(), covariance)?.covariance();
+        Ok(Self {
+            means,
+            shared_covariance,
+        })
     }
 
     /// `count` particles that all have the mean and covariance of `belief`.
@@ -55,30 +52,10 @@ impl<const D: usize> GaussianCloud<D> {
         Self::new(Particles::from_draws(count, || *belief.mean())?, *belief.covariance())
     }
 
-    /// The conditional means with their weights.
-    pub fn means(&self) -> &Particles<D> {
-        &self.means
-    }
-
-    /// The conditional means, to be changed in place.
-    pub fn means_mut(&mut self) -> &mut Particles<D> {
-        &mut self.means
-    }
-
-    /// The covariance that all particles share.
-    pub fn shared_covariance(&self) -> &SMatrix<f64, D, D> {
-        &self.covariance
-    }
-
-    /// Replaces the shared covariance. It is not checked; the update must keep it symmetric positive semidefinite.
-    pub fn set_shared_covariance(&mut self, covariance: SMatrix<f64, D, D>) {
-        self.covariance = covariance;
-    }
-
     /// The Gaussian of the same mean and covariance: the covariance is the shared one plus that of the means.
     pub fn gaussian(&self) -> Gaussian<D> {
         let mean = self.means.mean();
-        Gaussian::from_trusted_parts(mean, self.covariance + self.means.covariance_about(&mean))
+        Gaussian::from_trusted_parts(mean, self.shared_covariance + self.means.covariance_about(&mean))
     }
 }
 
@@ -93,7 +70,7 @@ impl<const D: usize> Belief<D> for GaussianCloud<D> {
 
     /// Draws a particle by its weight, then a state from its Gaussian.
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
-        let spread = Gaussian::from_trusted_parts(SVector::zeros(), self.covariance);
+        let spread = Gaussian::from_trusted_parts(SVector::zeros(), self.shared_covariance);
         spread.sample_columns(rng, states.each_mut().map(|column| &mut **column));
         let cumulative = Categorical::new(self.means.weights());
         change_each(states, |offset| state_at(&self.means.columns(), cumulative.draw(rng)) + offset);

@@ -64,7 +64,7 @@ fn draw(stream: Stream, sensors: usize, moment: &Moment) -> Result<Vec<f64>, Err
             return Ok(variances);
         }
     }
-    Err(Error::Table(format!("no network of mean {mean} and deviation {sd} in {MAX_DRAWS} draws")))
+    Err(Error::failed(format_args!("no network of mean {mean} and deviation {sd} in {MAX_DRAWS} draws")))
 }
 
 /// The errors in the order of the columns, of one decoder after the other.

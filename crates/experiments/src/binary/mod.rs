@@ -107,7 +107,7 @@ fn each<T: Send>(points: &[f64], f: impl Fn(f64) -> Result<T, Error> + Sync) -> 
 fn crossing(mut low: f64, mut high: f64, f: impl Fn(f64) -> Result<f64, Error>) -> Result<f64, Error> {
     let sign = f(low)?.signum();
     if f(high)?.signum() == sign {
-        return Err(Error::Table(format!("no crossing between {low} and {high}")));
+        return Err(Error::failed(format_args!("no crossing between {low} and {high}")));
     }
     while high - low > 1e-8 {
         let middle = 0.5 * (low + high);

@@ -135,7 +135,7 @@ impl Figure for Lobes {
             }
         }
         let Some((deployment, posterior, apart)) = shown else {
-            return Err(Error::Table("no search gave a belief".to_owned()));
+            return Err(Error::failed("no search gave a belief"));
         };
         let projected = self.form.map(|form| project(&posterior, form, &POSITION_ONLY));
         let belief = projected.transpose()?.flatten();

@@ -27,10 +27,10 @@ rows! {
     }
 
     struct Mean by "{nu1} {nu2}" {
-        nu1: usize => "First index.",
-        nu2: usize => "Second index.",
-        mean: f64 => "Mean of the recursion's polynomial under the Gaussian.",
-        printed: Option<f64> => "Mean of the printed polynomial, where it is misprinted (erratum diffusive-3).",
+        nu1: usize as x("index nu") => "First index.",
+        nu2: usize as x => "Second index.",
+        mean: f64 as points("by the recursion") => "Mean of the recursion's polynomial under the Gaussian.",
+        printed: Option<f64> as points("as printed") => "Mean of the printed polynomial, where it is misprinted (erratum diffusive-3).",
     }
 }
 
@@ -54,12 +54,12 @@ pub struct Table1;
 impl Figure for Table1 {
     figure!(Parameters => Rows, "diffusive-table1", "Hermite polynomials of two variables", "Zhao and Nehorai 2007, Table I",
         "The polynomials He_nu(z; W) by the recursion, with the two misprinted entries of the paper's table beside \
-         them. Every polynomial but the first has mean zero under the Gaussian; the misprints do not.");
+         them. Every polynomial but the first has mean zero under the Gaussian; the misprints do not."; linear("mean under the Gaussian"));
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let cross = p.correlation * (p.variance1 * p.variance2).sqrt();
         let precision = Matrix2::new(p.variance1, cross, cross, p.variance2).try_inverse();
-        let w = precision.ok_or(Error::Table("the covariance is singular".to_owned()))?;
+        let w = precision.ok_or_else(|| Error::failed("the covariance is singular"))?;
         let mean_of = |terms: &[([usize; 2], f64)]| -> Result<f64, Error> {
             let parts = terms
                 .iter()
@@ -99,16 +99,5 @@ impl Figure for Table1 {
         claims.all("zero-mean", what, rows.means.iter().filter(|m| m.nu1 + m.nu2 > 0), |m| m.mean.abs() < 1e-10);
         let count = rows.means.len() as f64;
         here.near("complete", "fifteen polynomials up to degree four", count, 15.0, 0.0);
-    }
-
-    fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let bars =
-            |value: fn(&Mean) -> Option<f64>| points(rows.means.iter().enumerate(), |(i, m)| (i as f64, value(m)));
-        let index = Axis::categories("index nu", rows.means.iter().map(|m| format!("{}{}", m.nu1, m.nu2)));
-        Plot::of(
-            Panel::new("Mean under the Gaussian", index, Axis::linear("mean"))
-                .with(Layer::bars("as printed", bars(|m| m.printed), 0.6).coloured(1))
-                .with(Layer::points("by the recursion", bars(|m| Some(m.mean))).coloured(0)),
-        )
     }
 }

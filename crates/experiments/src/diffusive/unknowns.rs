@@ -76,7 +76,7 @@ impl Figure for Unknowns {
                 information[(i, j)] * scale[i] * scale[j]
             });
             let Some(factor) = scaled.cholesky() else {
-                return Err(Error::Table("the information is singular".to_owned()));
+                return Err(Error::failed("the information is singular"));
             };
             let variance = factor.inverse()[(0, 0)] * scale[0] * scale[0];
             bounds.push(Bound {

@@ -211,7 +211,7 @@ impl<const D: usize, G: LinearDynamics<D> + Clone + Send + Sync + 'static> World
         let (world, sensors) = (self.clone(), sensors.to_vec());
         let run = move |stream: Stream| {
             let (truths, mut measurements) = world.draw(&sensors, stream);
-            let reporting = centre().map_err(Error::Failed)?.sensors();
+            let reporting = centre().map_err(Error::failed)?.sensors();
             measurements.iter_mut().for_each(|slot| slot.truncate(reporting));
             let (clock, own) = (clock()?, stream.named("filter"));
             let Member { feedback, report } = member;

@@ -59,12 +59,7 @@ parameters! {
 impl Source {
     /// The signals.
     pub fn load(&self, figure: &'static str, context: &Context<'_>) -> Result<Vec<Recording>, Error> {
-        let refused = |name: &str, value: &str, reason: String| Error::Refused {
-            figure,
-            name: name.into(),
-            value: value.into(),
-            reason,
-        };
+        let refused = |name: &str, value: &str, reason: String| Error::refused(figure, name, value, reason);
         let all = if self.recording.is_empty() {
             synthetic(&context.stream("real"), self.samples)
         } else {

@@ -96,7 +96,7 @@ fn run(particles: usize, stream: Stream) -> [f64; 3] {
         let predicted = kalman::predict(&dynamics, &belief);
         filter.predict(&mut rng, &dynamics, &mut cloud).unwrap();
         let broadcast = if particles > 0 {
-            cloud.means().mean()
+            cloud.means.mean()
         } else {
             *predicted.mean()
         };

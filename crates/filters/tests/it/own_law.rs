@@ -8,8 +8,7 @@ use fewbits_filters::{GridFilter, Imm, MomentFilter, PointMassFilter, StateFilte
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
 use nalgebra::Vector1;
-use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
+use rand::RngExt;
 
 /// A sensor of which reading `sqrt(x^2 + 1)`: its posterior has two modes.
 #[derive(Debug, Clone, Copy)]
@@ -26,11 +25,6 @@ impl Sensing<1, 1> for Even {
 
     fn noise_covariance_at(&self, _: &Vector1<f64>) -> nalgebra::Matrix1<f64> {
         nalgebra::Matrix1::new(self.0)
-    }
-
-    fn sample(&self, rng: &mut dyn Rng, x: &Vector1<f64>) -> Vector1<f64> {
-        let mean = Sensing::<1, 1>::mean(self, x);
-        Vector1::new(mean[0] + self.0.sqrt() * rng.sample::<f64, _>(StandardNormal))
     }
 }
 

@@ -5,7 +5,7 @@ use fewbits_models::{
     Ar1, ContinuousLinear, LinearGaussian, LinearSensor, ReceivedPower, constant_velocity_1d, constant_velocity_2d,
 };
 use nalgebra::{Matrix2, Matrix2x4, SVector, Vector2, Vector4};
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 const DRAWS: usize = 20_000;
@@ -82,6 +82,10 @@ fn sensing() {
         let power = ReceivedPower::<4>::new(Vector2::new(1.0, -2.0), [0, 2], 50.0, 0.3, exponent, 1.7).unwrap();
         laws::sensing::is_consistent(&power, &states).unwrap();
         laws::sensing::draws_have_the_law(&power, &mut rng, &states[3], DRAWS).unwrap();
+        // One normal number a component, to the last bit.
+        let normal: f64 = rng.clone().sample(rand_distr::StandardNormal);
+        let expected = power.mean(&states[3])[0] + 1.7_f64.sqrt() * normal;
+        assert_eq!(power.sample(&mut rng, &states[3])[0], expected);
     }
 }
 

@@ -36,7 +36,8 @@ fn results_come_in_trial_order_and_progress_is_complete() {
     let count = |trials| {
         seen.fetch_add(trials, Ordering::Relaxed);
     };
-    let run = MonteCarlo::new(Stream::new(1), 333).with_progress(&count);
+    let mut run = MonteCarlo::new(Stream::new(1), 333);
+    run.progress = Some(&count);
     let indices = run.run(|trial| Ok::<_, Infallible>(trial.index)).unwrap();
     assert_eq!(indices, (0..333).collect::<Vec<_>>());
     assert_eq!(seen.load(Ordering::Relaxed), 333);
@@ -95,7 +96,8 @@ fn errors_of_any_type_and_panics_stay_with_their_trial() {
 fn a_cancelled_run_stops() {
     let cancel = AtomicBool::new(false);
     let started = AtomicU64::new(0);
-    let run = MonteCarlo::new(Stream::new(1), 1_000_000).with_cancellation(&cancel);
+    let mut run = MonteCarlo::new(Stream::new(1), 1_000_000);
+    run.cancel = Some(&cancel);
     let result = run.run(|_| {
         started.fetch_add(1, Ordering::Relaxed);
         cancel.store(true, Ordering::Relaxed);

@@ -3,8 +3,12 @@
 use super::Area;
 use super::scale::Scaled;
 use crate::Marker;
+use plotters::drawing::DrawingAreaErrorKind;
 use plotters::element::{Circle, PathElement, Polygon};
 use plotters::style::{RGBColor, ShapeStyle};
+
+/// Whether the back end drew it.
+pub(super) type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 
 /// A place on paper, in units from the top left.
 pub(super) type Place = (f64, f64);
@@ -90,7 +94,7 @@ impl Frame<'_, '_> {
     }
 
     /// Draws the curve through values, cut at the frame and broken where an axis cannot show it.
-    pub(super) fn curve(&self, points: &[(f64, f64)], pattern: &[f64], pen: ShapeStyle) -> Result<(), String> {
+    pub(super) fn curve(&self, points: &[(f64, f64)], pattern: &[f64], pen: ShapeStyle) -> Drawn {
         let mut pieces: Vec<Vec<Place>> = Vec::new();
         for pair in points.windows(2) {
             let ends = self.place(pair[0]).zip(self.place(pair[1]));
@@ -107,7 +111,7 @@ impl Frame<'_, '_> {
 }
 
 /// Draws a line on paper in dashes; no pattern is solid.
-pub(super) fn path(area: &Area<'_>, line: &[Place], pattern: &[f64], pen: ShapeStyle) -> Result<(), String> {
+pub(super) fn path(area: &Area<'_>, line: &[Place], pattern: &[f64], pen: ShapeStyle) -> Drawn {
     let lines = if pattern.is_empty() {
         vec![line.to_vec()]
     } else {
@@ -115,7 +119,7 @@ pub(super) fn path(area: &Area<'_>, line: &[Place], pattern: &[f64], pen: ShapeS
     };
     for line in lines {
         let line: Vec<_> = line.into_iter().map(round).collect();
-        area.draw(&PathElement::new(line, pen)).map_err(|e| e.to_string())?;
+        area.draw(&PathElement::new(line, pen))?;
     }
     Ok(())
 }
@@ -155,7 +159,7 @@ fn dashed(line: &[Place], pattern: &[f64]) -> Vec<Vec<Place>> {
 }
 
 /// Draws one mark on paper.
-pub(super) fn mark(area: &Area<'_>, place: Place, marker: Marker, colour: RGBColor) -> Result<(), String> {
+pub(super) fn mark(area: &Area<'_>, place: Place, marker: Marker, colour: RGBColor) -> Drawn {
     use plotters::style::Color;
     let (fill, pen) = (colour.filled(), colour.stroke_width(7));
     let (x, y) = place;
@@ -199,7 +203,6 @@ pub(super) fn mark(area: &Area<'_>, place: Place, marker: Marker, colour: RGBCol
             (1.1, -0.65),
         ]),
     }
-    .map_err(|e| e.to_string())
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Legends stand below their panel, where they hide no data, and show the marks that are drawn; the colour bar of fields.
 
 use super::Area;
-use super::frame::{mark, path};
+use super::frame::{Drawn, mark, path};
 use super::scale::Scaled;
 use super::style::{LINE, PANEL_WIDTH, TEXT, TICK, colour, dashes, heat, marker, pen, text, wide};
 use crate::{Axis, Layer, Panel, Shape};
@@ -136,7 +136,7 @@ pub(super) fn height(blocks: &[Block<'_>]) -> i32 {
 }
 
 /// Draws a row's legend.
-pub(super) fn draw(area: &Area<'_>, blocks: &[Block<'_>], top: i32) -> Result<(), String> {
+pub(super) fn draw(area: &Area<'_>, blocks: &[Block<'_>], top: i32) -> Drawn {
     for (start, width, entries) in blocks {
         for (line, row) in lines(entries, *width).into_iter().zip(0..) {
             let middle = top + row * LINE + LINE / 2;
@@ -145,7 +145,7 @@ pub(super) fn draw(area: &Area<'_>, blocks: &[Block<'_>], top: i32) -> Result<()
                 entry.marks.map_or(Ok(()), |marks| sample(area, marks, left, middle))?;
                 let style = text(TEXT).pos(Pos::new(HPos::Left, VPos::Center));
                 let words = Text::new(entry.layer.label.clone(), (left + SAMPLE, middle), style);
-                area.draw(&words).map_err(|e| e.to_string())?;
+                area.draw(&words)?;
             }
         }
     }
@@ -159,7 +159,7 @@ fn belongs(marks: &Layer, curve: &Layer) -> bool {
 }
 
 /// What a layer looks like.
-fn sample(area: &Area<'_>, layer: &Layer, left: i32, middle: i32) -> Result<(), String> {
+fn sample(area: &Area<'_>, layer: &Layer, left: i32, middle: i32) -> Drawn {
     let ends = [
         (f64::from(left), f64::from(middle)),
         (f64::from(left + SAMPLE - 30), f64::from(middle)),
@@ -178,18 +178,13 @@ fn sample(area: &Area<'_>, layer: &Layer, left: i32, middle: i32) -> Result<(), 
                 0.8
             };
             let filled = Rectangle::new(corners, colour(layer).mix(opacity).filled());
-            area.draw(&filled).map_err(|e| e.to_string())
+            area.draw(&filled)
         }
     }
 }
 
 /// Draws the ramp of a field with its values, as high as the field's frame.
-pub(super) fn colour_bar(
-    area: &Area<'_>,
-    label: &str,
-    (low, high): (f64, f64),
-    (top, bottom): (i32, i32),
-) -> Result<(), String> {
+pub(super) fn colour_bar(area: &Area<'_>, label: &str, (low, high): (f64, f64), (top, bottom): (i32, i32)) -> Drawn {
     let (width, _) = area.dim_in_pixel();
     let steps = 64;
     let at = |share: f64| bottom - (f64::from(bottom - top) * share).round() as i32;
@@ -197,7 +192,7 @@ pub(super) fn colour_bar(
     for i in (0..steps).rev() {
         let (from, to) = (f64::from(i) / f64::from(steps), f64::from(i + 1) / f64::from(steps));
         let bar = Rectangle::new([(20, at(to)), (100, bottom)], heat(0.5 * (from + to)).filled());
-        area.draw(&bar).map_err(|e| e.to_string())?;
+        area.draw(&bar)?;
     }
     let axis = Scaled::new(&Axis::linear("").between(low, high), std::iter::empty(), false);
     for value in axis.ticks(6) {
@@ -206,9 +201,9 @@ pub(super) fn colour_bar(
             (124, at(axis.position(value))),
             text(TICK).pos(Pos::new(HPos::Left, VPos::Center)),
         );
-        area.draw(&words).map_err(|e| e.to_string())?;
+        area.draw(&words)?;
     }
     let style = text(TICK).pos(Pos::new(HPos::Right, VPos::Center));
     let words = Text::new(label.to_owned(), (width as i32 - 30, top - 76), style);
-    area.draw(&words).map_err(|e| e.to_string())
+    area.draw(&words)
 }

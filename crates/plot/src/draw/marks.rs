@@ -1,18 +1,14 @@
 //! Layers on their axes.
 
-use super::frame::{Frame, MARK, mark};
+use super::frame::{Drawn, Frame, MARK, mark};
 use super::style::{PAPER, TICK, colour, dashes, heat, marker, pen, text, wide};
 use crate::{Layer, Shape};
 use plotters::element::{PathElement, Polygon, Rectangle, Text};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, FontTransform, RGBColor};
 
-fn why(error: impl std::fmt::Display) -> String {
-    error.to_string()
-}
-
 /// Draws one layer; `shades` are the values at the ends of the colour ramp of fields.
-pub(super) fn draw(frame: &Frame<'_, '_>, layer: &Layer, shades: (f64, f64)) -> Result<(), String> {
+pub(super) fn draw(frame: &Frame<'_, '_>, layer: &Layer, shades: (f64, f64)) -> Drawn {
     let ink = colour(layer);
     match &layer.shape {
         Shape::Line { points, stroke } => {
@@ -44,7 +40,7 @@ pub(super) fn draw(frame: &Frame<'_, '_>, layer: &Layer, shades: (f64, f64)) -> 
                     false => round(at.0, frame.down_cut(p.1 + sign * error)),
                 };
                 let bar = PathElement::new(vec![end(-1.0), end(1.0)], ink.stroke_width(6));
-                frame.area.draw(&bar).map_err(why)?;
+                frame.area.draw(&bar)?;
             }
             for (_, at) in shown() {
                 mark(frame.area, at, marker(layer), ink)?;
@@ -70,7 +66,7 @@ pub(super) fn draw(frame: &Frame<'_, '_>, layer: &Layer, shades: (f64, f64)) -> 
             let outline: Vec<_> = outline
                 .map(|p| (frame.across(p.0).round() as i32, frame.down_cut(p.1).round() as i32))
                 .collect();
-            frame.area.draw(&Polygon::new(outline, ink.mix(0.25))).map_err(why)
+            frame.area.draw(&Polygon::new(outline, ink.mix(0.25)))
         }
         Shape::Texts { texts, beside } => {
             let style = text(TICK).pos(Pos::new(HPos::Center, VPos::Center));
@@ -86,10 +82,10 @@ pub(super) fn draw(frame: &Frame<'_, '_>, layer: &Layer, shades: (f64, f64)) -> 
                     at = ((at.0 + MARK + half).min(last), (at.1 - MARK - high).max(first));
                     let ground = [round(at.0 - half, at.1 - high), round(at.0 + half, at.1 + high)];
                     let paper = Rectangle::new(ground, PAPER.mix(0.55).filled());
-                    frame.area.draw(&paper).map_err(why)?;
+                    frame.area.draw(&paper)?;
                 }
                 let name = Text::new(words.clone(), round(at.0, at.1), style.clone());
-                frame.area.draw(&name).map_err(why)?;
+                frame.area.draw(&name)?;
             }
             Ok(())
         }
@@ -105,7 +101,7 @@ fn errors_of(points: &[(f64, f64)], errors: &[f64], frame: &Frame<'_, '_>) -> Ve
 
 /// Writes the names of contours on them, along steep ones upwards: as near to the middle of what is seen as no other contour and
 /// no other name allows.
-pub(super) fn names(frame: &Frame<'_, '_>, layers: &[Layer]) -> Result<(), String> {
+pub(super) fn names(frame: &Frame<'_, '_>, layers: &[Layer]) -> Drawn {
     type Box = (f64, f64, f64, f64);
     let meet = |a: &Box, b: &Box| a.0 < b.1 && b.0 < a.1 && a.2 < b.3 && b.2 < a.3;
     let seen = |layer: &Layer| match &layer.shape {
@@ -145,7 +141,7 @@ pub(super) fn names(frame: &Frame<'_, '_>, layers: &[Layer]) -> Result<(), Strin
         let here = ground(at);
         let round = |x: f64, y: f64| (x.round() as i32, y.round() as i32);
         let paper = Rectangle::new([round(here.0, here.2), round(here.1, here.3)], PAPER.mix(0.9).filled());
-        frame.area.draw(&paper).map_err(why)?;
+        frame.area.draw(&paper)?;
         let style = text(TICK).pos(Pos::new(HPos::Center, VPos::Center));
         let style = if steep(at) {
             style.transform(FontTransform::Rotate270)
@@ -153,22 +149,19 @@ pub(super) fn names(frame: &Frame<'_, '_>, layers: &[Layer]) -> Result<(), Strin
             style
         };
         let name = Text::new(layer.label.clone(), round(curve[at].0, curve[at].1), style);
-        frame.area.draw(&name).map_err(why)?;
+        frame.area.draw(&name)?;
         written.push(here);
     }
     Ok(())
 }
 
 /// Filled rectangles `(left, right, bottom, top)`, cut at the frame.
-fn boxes(frame: &Frame<'_, '_>, boxes: &[(f64, f64, f64, f64)], ink: RGBColor, opacity: f64) -> Result<(), String> {
+fn boxes(frame: &Frame<'_, '_>, boxes: &[(f64, f64, f64, f64)], ink: RGBColor, opacity: f64) -> Drawn {
     for (left, right, bottom, top) in boxes.iter().filter(|b| frame.x.accepts(b.0) && frame.x.accepts(b.1)) {
         let across = |x: f64| frame.across(x).clamp(frame.left, frame.right).round() as i32;
         let down = |y: f64| frame.down_cut(y).round() as i32;
         let corners = [(across(*left), down(*bottom)), (across(*right), down(*top))];
-        frame
-            .area
-            .draw(&Rectangle::new(corners, ink.mix(opacity).filled()))
-            .map_err(why)?;
+        frame.area.draw(&Rectangle::new(corners, ink.mix(opacity).filled()))?;
     }
     Ok(())
 }
@@ -176,13 +169,7 @@ fn boxes(frame: &Frame<'_, '_>, boxes: &[(f64, f64, f64, f64)], ink: RGBColor, o
 /// Shades of a field besides the lowest: more than an eye tells apart.
 const SHADES: f64 = 128.0;
 
-fn field(
-    frame: &Frame<'_, '_>,
-    x: &[f64],
-    y: &[f64],
-    values: &[Vec<f64>],
-    (low, high): (f64, f64),
-) -> Result<(), String> {
+fn field(frame: &Frame<'_, '_>, x: &[f64], y: &[f64], values: &[Vec<f64>], (low, high): (f64, f64)) -> Drawn {
     let (left, bottom) = (edges(x), edges(y));
     // Each cell reaches under its next neighbours, drawn later, so that no seam shines through.
     let under = |edges: &[f64], i: usize| edges[(i + 2).min(edges.len() - 1)];

@@ -8,13 +8,13 @@ mod scale;
 mod style;
 
 use crate::{Error, Panel, Plot, Shape};
-use frame::Frame;
+use frame::{Drawn, Frame};
 use names::{GAP, Names};
 use plotters::backend::SVGBackend;
 use plotters::chart::ChartBuilder;
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::ValueFormatter;
-use plotters::drawing::{DrawingArea, IntoDrawingArea};
+use plotters::drawing::{DrawingArea, DrawingAreaErrorKind, IntoDrawingArea};
 use plotters::element::{PathElement, Text};
 use plotters::style::ShapeStyle;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -56,7 +56,7 @@ pub fn to_svg(plot: &Plot) -> Result<String, Error> {
         let size = (PANEL_WIDTH * columns as u32, total.max(1) as u32);
         let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
         let all = || {
-            root.fill(&PAPER).map_err(why)?;
+            root.fill(&PAPER)?;
             let mut top = 0;
             for ((row, legend), (panels, below)) in rows.iter().zip(&legends).zip(&heights) {
                 for (column, panel) in row.iter().enumerate() {
@@ -67,9 +67,11 @@ pub fn to_svg(plot: &Plot) -> Result<String, Error> {
                 legend::draw(&root, legend, top + panels + 24)?;
                 top += panels + below;
             }
-            root.present().map_err(why)
+            root.present()
         };
-        all().map_err(|reason| Error::Refused { reason })?;
+        all().map_err(|error: DrawingAreaErrorKind<std::io::Error>| Error::Refused {
+            reason: error.to_string(),
+        })?;
     }
     Ok(scaled(&svg))
 }
@@ -87,10 +89,6 @@ fn scaled(svg: &str) -> String {
         .filter(|word| !word.starts_with("width=") && !word.starts_with("height="));
     let head = kept.collect::<Vec<_>>().join(" ");
     format!("{}{head} style=\"width:100%;height:auto;max-height:100vh\"{}", &svg[..start], &svg[end..])
-}
-
-fn why(error: impl std::fmt::Display) -> String {
-    error.to_string()
 }
 
 /// Height of a panel: names left of it have room, and maps that are wider than high leave none below.
@@ -183,15 +181,12 @@ fn tick(axis: &Scaled, value: f64) -> String {
 }
 
 /// Draws the small ticks of logarithmic axes, inside the frame.
-fn small_ticks(frame: &Frame<'_, '_>) -> Result<(), String> {
+fn small_ticks(frame: &Frame<'_, '_>) -> Drawn {
     const LENGTH: f64 = 16.0;
     let pen = ShapeStyle::from(&INK).stroke_width(3);
     let draw = |from: (f64, f64), to: (f64, f64)| {
         let round = |(x, y): (f64, f64)| (x.round() as i32, y.round() as i32);
-        frame
-            .area
-            .draw(&PathElement::new(vec![round(from), round(to)], pen))
-            .map_err(why)
+        frame.area.draw(&PathElement::new(vec![round(from), round(to)], pen))
     };
     for value in frame.x.small_ticks() {
         let across = frame.across(value);
@@ -204,7 +199,7 @@ fn small_ticks(frame: &Frame<'_, '_>) -> Result<(), String> {
     Ok(())
 }
 
-fn draw_panel(root: &Area<'_>, area: &Area<'_>, panel: &Panel, plot: &Plot) -> Result<(), String> {
+fn draw_panel(root: &Area<'_>, area: &Area<'_>, panel: &Panel, plot: &Plot) -> Drawn {
     let heat = field_of(panel);
     let (width, height) = area.dim_in_pixel();
     let (main, margin) = area.split_horizontally(width as i32 - if heat.is_some() { COLOUR_BAR } else { 0 });
@@ -230,8 +225,7 @@ fn draw_panel(root: &Area<'_>, area: &Area<'_>, panel: &Panel, plot: &Plot) -> R
         .margin_bottom(MARGIN + spare.max(0.0) as i32)
         .x_label_area_size(below)
         .y_label_area_size(left)
-        .build_cartesian_2d(x.clone(), y.clone())
-        .map_err(why)?;
+        .build_cartesian_2d(x.clone(), y.clone())?;
     chart
         .configure_mesh()
         .light_line_style(PAPER)
@@ -246,8 +240,7 @@ fn draw_panel(root: &Area<'_>, area: &Area<'_>, panel: &Panel, plot: &Plot) -> R
         .y_labels(9)
         .x_desc(&panel.x.label)
         .y_desc(&panel.y.label)
-        .draw()
-        .map_err(why)?;
+        .draw()?;
     let (across, down) = chart.plotting_area().get_pixel_range();
     let (left, right) = (f64::from(across.start), f64::from(across.end));
     let (top, bottom) = (f64::from(down.start), f64::from(down.end));
@@ -269,7 +262,7 @@ fn draw_panel(root: &Area<'_>, area: &Area<'_>, panel: &Panel, plot: &Plot) -> R
     let middle = (0.5 * (left + right)).clamp(first, last.max(first)) as i32;
     let style = text(TITLE).pos(Pos::new(HPos::Center, VPos::Center));
     let title = Text::new(panel.title.clone(), (middle, down.start - 76), style);
-    root.draw(&title).map_err(why)?;
+    root.draw(&title)?;
     let range = heat.map_or((0.0, 1.0), |label| shades(plot, label));
     for layer in &panel.layers {
         marks::draw(&frame, layer, range)?;

@@ -1,6 +1,6 @@
 //! Categories at an axis: names in lines that fit their room.
 
-use super::frame::Frame;
+use super::frame::{Drawn, Frame};
 use super::scale::Scaled;
 use super::style::{TICK, text, wide};
 use plotters::element::Text;
@@ -74,7 +74,7 @@ impl Names {
     }
 
     /// Writes them below the frame.
-    pub(super) fn draw_below(&self, frame: &Frame<'_, '_>) -> Result<(), String> {
+    pub(super) fn draw_below(&self, frame: &Frame<'_, '_>) -> Drawn {
         for ((at, lines), place) in self.lines.iter().zip(0..) {
             let x = frame.across(*at).round() as i32;
             let lower = if self.staggered {
@@ -88,7 +88,7 @@ impl Names {
     }
 
     /// Writes them left of the frame.
-    pub(super) fn draw_left(&self, frame: &Frame<'_, '_>) -> Result<(), String> {
+    pub(super) fn draw_left(&self, frame: &Frame<'_, '_>) -> Drawn {
         for (at, lines) in &self.lines {
             let y = frame.down(*at).round() as i32 - (lines.len() as i32 - 1) * NAME / 2;
             column(frame, lines, (frame.left as i32 - GAP, y), Pos::new(HPos::Right, VPos::Center))?;
@@ -97,10 +97,10 @@ impl Names {
     }
 }
 
-fn column(frame: &Frame<'_, '_>, lines: &[String], (x, y): (i32, i32), anchor: Pos) -> Result<(), String> {
+fn column(frame: &Frame<'_, '_>, lines: &[String], (x, y): (i32, i32), anchor: Pos) -> Drawn {
     for (line, down) in lines.iter().zip(0..) {
         let words = Text::new(line.clone(), (x, y + down * NAME), text(TICK).pos(anchor));
-        frame.area.draw(&words).map_err(|e| e.to_string())?;
+        frame.area.draw(&words)?;
     }
     Ok(())
 }
