@@ -20,16 +20,16 @@ rows! {
     }
 
     struct Distance by "{sigma}" {
-        sigma: f64 as x("measurement noise deviation sigma") => "Measurement noise deviation.",
-        distance: f64 ["1/unit"] as curve("exact") in distance => "Largest difference of the densities.",
+        sigma: f64 => "Measurement noise deviation.",
+        distance: f64 ["1/unit"] => "Largest difference of the densities.",
         cubed: f64 => "Distance times prior deviation times (sigma/prior deviation)^3.",
     }
 
     struct Density {
-        theta: f64 ["unit"] as x("state") => "State.",
-        exact: f64 ["1/unit"] as line("exact posterior") in densities => "Posterior after a +1 at the prior mean.",
-        normal: f64 ["1/unit"] as dashed("normal, same moments") in densities => "Normal density of the same moments.",
-        prior: f64 ["1/unit"] as dashed("prior") in densities => "Density before.",
+        theta: f64 ["unit"] => "State.",
+        exact: f64 ["1/unit"] => "Posterior after a +1 at the prior mean.",
+        normal: f64 ["1/unit"] => "Normal density of the same moments.",
+        prior: f64 ["1/unit"] => "Density before.",
     }
 }
 
@@ -39,8 +39,7 @@ impl Figure for PosteriorShape {
     figure!(Parameters => Rows, "dymbo-prop1b", "The posterior of one bit is nearly normal", "Ribeiro and Giannakis, Proposition 1(b)",
         "Largest difference between the exact posterior density after one bit, which is skew-normal, and the normal \
          density of the same mean and variance. It falls with the cube of the noise (Proposition 1b, restated: erratum dymbo-11). \
-         Right: both densities at the smallest noise, where they differ most.";
-        { distance: loglog("largest density difference", "Distance from normal"), densities: linear("density", "Densities at the smallest noise") });
+         Right: both densities at the smallest noise, where they differ most.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let prior = Gaussian::scalar(0.0, p.sigma_theta * p.sigma_theta)?;
@@ -79,5 +78,20 @@ impl Figure for PosteriorShape {
         here.near("cubic", "twice the noise, an eighth of the difference (erratum dymbo-11)", ratio, 8.0, 0.01);
         let constant = rows.last().map(|r| r.cubed);
         here.near("constant", "constant of the cubic law", constant, 0.0200, 5e-5);
+    }
+
+    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
+        let law = |sigma: f64| (sigma, 0.02 / p.sigma_theta * (p.sigma_theta / sigma).powi(3));
+        let x = "measurement noise deviation sigma";
+        let distance = Panel::loglog("Distance from normal", x, "largest density difference")
+            .with(Layer::dashed("0.02 / sigma^3", p.sigma.iter().map(|s| law(*s)).collect()).coloured(1))
+            .with(Layer::points("exact", points(&rows.distances, |r| (r.sigma, r.distance))).coloured(0));
+        let curve = |of: fn(&Density) -> f64| points(&rows.densities, |r| (r.theta, of(r)));
+        let title = "Densities at the smallest noise";
+        let densities = Panel::linear(title, "state", "density")
+            .with(Layer::dashed("prior", curve(|r| r.prior)).coloured(2))
+            .with(Layer::line("exact posterior", curve(|r| r.exact)).coloured(0))
+            .with(Layer::dashed("normal, same moments", curve(|r| r.normal)).coloured(1));
+        Plot::grid(2, vec![distance, densities])
     }
 }
