@@ -57,7 +57,7 @@ fn best(row: &str) -> f64 {
     let (criterion, model) = (criterion(name), pair(sd.unwrap_or(1.0), if sd.is_none() { 0.85 } else { 0.0 }));
     let design = if cells == "contiguous" {
         let start = System::ideal(model.clone(), vec![lloyd(levels, model.sample_deviation(0)); 2]).unwrap();
-        design::multi_start(&start, criterion, 20, 1, &Newton::default()).unwrap()
+        baselines::multi_start(&start, criterion, 20, 1, &Newton::default()).unwrap()
     } else {
         let request = Request {
             criterion,
@@ -167,7 +167,7 @@ fn no_design_beats_a_bound() {
         let design = joint(&System::new(model, vec![group]).unwrap(), MSE);
         assert!(design.value > bound.distortion, "{row}");
         if crossover == 0.0 {
-            assert!(design.value > bounds::bayesian_cramer_rao(&design.system).unwrap(), "{row}");
+            assert!(design.value > baselines::bayesian_cramer_rao(&design.system).unwrap(), "{row}");
         }
         bound.distortion
     });

@@ -47,5 +47,5 @@ pub use observation::sensor::PatternSensor;
 pub use observation::source::{Nodes, Source, Threshold};
 pub use patterns::grid::CellGrid;
 pub use patterns::linear::{Mask, gray_basis, linear_pattern, mask_of, natural_basis, rank};
-pub use patterns::pattern::{Pattern, check_separation};
+pub use patterns::pattern::Pattern;
 pub use patterns::quantizer::BinaryQuantizer;

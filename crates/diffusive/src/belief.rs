@@ -47,7 +47,7 @@ pub enum Prior {
 impl<const D: usize> SentBelief<D> {
     pub(crate) fn bounds(&self) -> SearchBox {
         match self {
-            Self::Mixture(mixture) => bounds(mixture.components().iter(), 1.0),
+            Self::Mixture(mixture) => bounds(mixture.components()),
             Self::Other(density) => density.bounds(),
         }
     }

@@ -92,7 +92,10 @@ impl Form {
     /// Whether messages can hold this form with this rate.
     pub(crate) fn check(&self, rate: &RateModel) -> Result<(), Error> {
         match *self {
-            Self::Mixture(n) => check_components(n),
+            Self::Mixture(n) if n > MAX_COUNT => {
+                refuse("components", n, format!("at most {MAX_COUNT}, the largest number in a message"))
+            }
+            Self::Mixture(n) => Ok(at_least_one("components", n).map(|_| ())?),
             Self::Other(form) => form.0.check(rate),
             Self::Raw | Self::Gaussian => Ok(()),
         }
@@ -115,19 +118,7 @@ impl Form {
 /// Largest number of components, and the code of a mixture, in a message.
 pub(crate) const MAX_COUNT: usize = (1 << COUNT_BITS) - 1;
 
-/// Whether a message can hold so many components.
-///
-/// # Errors
-/// If not.
-pub fn check_components(count: usize) -> Result<(), Error> {
-    at_least_one("components", count)?;
-    if count > MAX_COUNT {
-        return refuse("components", count, format!("at most {MAX_COUNT}, the largest number in a message"));
-    }
-    Ok(())
-}
-
 /// Numbers of one Gaussian over the position, or over position and rate: its mean and the lower triangle of its Cholesky factor.
-pub fn gaussian_scalars(with_rate: bool) -> usize {
+pub(crate) fn gaussian_scalars(with_rate: bool) -> usize {
     if with_rate { 3 + 6 } else { 2 + 3 }
 }

@@ -100,10 +100,3 @@ pub use search_box::SearchBox;
 pub use select::{SelectionRule, Selector};
 pub use sensor::SourceSensor;
 pub use walk::SourceChain;
-
-/// What `fewbits-baselines` needs of messages for its own forms.
-#[doc(hidden)]
-pub mod engine {
-    pub use crate::form::{check_components, gaussian_scalars};
-    pub use crate::search_box::bounds;
-}

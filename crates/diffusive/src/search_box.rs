@@ -27,15 +27,15 @@ impl SearchBox {
     }
 }
 
-/// The box of the first two coordinates of all Gaussians. Their variances are multiplied by `widening`.
-pub fn bounds<'a, const D: usize>(parts: impl Iterator<Item = &'a Component<D>>, widening: f64) -> SearchBox {
+/// The box of the first two coordinates of all Gaussians.
+pub(crate) fn bounds<const D: usize>(parts: &[Component<D>]) -> SearchBox {
     let mut hull = SearchBox {
         lower: [f64::INFINITY; 2],
         upper: [f64::NEG_INFINITY; 2],
     };
     for part in parts {
         for d in 0..2 {
-            let reach = ENDS * (widening * part.covariance()[(d, d)]).sqrt();
+            let reach = ENDS * part.covariance()[(d, d)].sqrt();
             hull.lower[d] = hull.lower[d].min(part.mean()[d] - reach);
             hull.upper[d] = hull.upper[d].max(part.mean()[d] + reach);
         }

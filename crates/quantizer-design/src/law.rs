@@ -2,9 +2,9 @@
 
 use crate::error::Error;
 use crate::outcomes::counts::Compositions;
-use crate::outcomes::{Table, cell_probabilities, for_each_log};
+use crate::outcomes::{Table, cell_probabilities};
 use crate::system::{SensorGroup, System};
-use fewbits_numerics::{kernels, normal};
+use fewbits_numerics::normal;
 
 /// A group whose breakpoints may change.
 #[derive(Debug, Clone)]
@@ -76,24 +76,6 @@ impl<'a> Active<'a> {
     pub fn symbols(&self, b: &[f64]) -> Table {
         let of = |t: usize, cell: usize| self.group.cell_transition(t, cell);
         self.cells(b).mixed(self.compositions.parts, of)
-    }
-
-    /// Logarithms of the symbols' probabilities at each node.
-    fn log_symbols(&self) -> Table {
-        let edges: Vec<f64> = self.breakpoints().iter().copied().chain([f64::INFINITY]).collect();
-        let mut values = Vec::with_capacity(self.compositions.parts * self.means.len());
-        for t in 0..self.compositions.parts {
-            values.extend(self.means.iter().map(|m| {
-                let mut low = f64::NEG_INFINITY;
-                let cells = edges.iter().enumerate().map(|(cell, edge)| {
-                    let high = (edge - m) / self.deviation;
-                    let inside = normal::log_interval(std::mem::replace(&mut low, high), high);
-                    inside + self.group.cell_transition(t, cell).ln()
-                });
-                kernels::log_sum_exp(&cells.collect::<Vec<_>>())
-            }));
-        }
-        Table::new(values, self.means.len())
     }
 
     /// Report probabilities of the whole group, and the symbol probabilities of one sensor.
@@ -168,26 +150,6 @@ pub(crate) fn symbol_tables(system: &System) -> Result<Vec<Table>, Error> {
 fn of_groups(system: &System, table: impl Fn(&Active<'_>) -> Table) -> Result<Vec<Table>, Error> {
     let groups = 0..system.groups().len();
     groups.map(|index| Ok(table(&Active::new(system, index)?))).collect()
-}
-
-/// `ln P(outcome | x_k)` for every joint outcome, outcomes by values. It stays accurate if the probabilities underflow.
-///
-/// # Errors
-/// [`Error::TooLarge`] if there are more outcomes than the system allows.
-pub fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
-    system.check_outcomes()?;
-    let tables = of_groups(system, |entry| entry.log_symbols().of_log_counts(entry.compositions.total))?;
-    let model = system.model();
-    let mut out = Vec::new();
-    for_each_log(&tables, &vec![0.0; model.nodes()], |_, row| {
-        // With correlated noise each value is a mixture over nodes: log-sum-exp over the nodes of the value.
-        for feature in &model.given {
-            let logs = row[feature.start..].iter().zip(&feature.weights);
-            let terms: Vec<f64> = logs.filter(|(_, w)| **w > 0.0).map(|(l, w)| l + w.ln()).collect();
-            out.push(kernels::log_sum_exp(&terms));
-        }
-    });
-    Ok(out)
 }
 
 /// All sums of an entry of `a` and an entry of `b`; the index of `b` varies faster.

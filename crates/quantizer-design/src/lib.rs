@@ -65,7 +65,7 @@
 pub mod engine {
     pub use crate::criterion::LOG_FLOOR;
     pub use crate::deadline::Deadline;
-    pub use crate::law::{Active, log_likelihoods};
+    pub use crate::law::Active;
     pub use crate::newton::{Objective, Stationary, climb};
     pub use crate::problem::Problem;
 }

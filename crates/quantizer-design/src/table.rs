@@ -135,10 +135,45 @@ impl JointTable {
     /// # Errors
     /// If the prior is continuous.
     pub fn equivocation(&self) -> Result<f64, Error> {
-        if !self.model().is_discrete() {
+        if !self.model().prior().is_discrete() {
             return refuse("prior", "a continuous prior", "a discrete prior for a conditional entropy");
         }
         let outcomes = self.likelihood.chunks_exact(self.values().len());
         Ok(outcomes.map(|q| equivocation(self.model().weights(), q)).sum())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Criterion, Noise, Prior, Quantizer};
+
+    /// If the probability of the wrong value is among the smallest numbers, its term of the entropy is zero, not infinite.
+    #[test]
+    fn equivocation_is_finite_where_probabilities_are_subnormal() {
+        for tenth in 700..800 {
+            let signal = f64::from(tenth) * 0.1;
+            let noise = Noise::independent_with_deviations(&[1.0]).unwrap();
+            let model = ObservationModel::new(Prior::binary(signal, 0.5).unwrap(), noise).unwrap();
+            let system = System::identical(model, Quantizer::new(vec![0.5 * signal]).unwrap()).unwrap();
+            let equivocation = JointTable::new(&system).unwrap().equivocation().unwrap();
+            assert!((0.0..1e-200).contains(&equivocation), "{equivocation} at {signal}");
+        }
+    }
+
+    #[test]
+    fn equivocation_and_information_make_up_the_prior_entropy() {
+        let model = ObservationModel::new(
+            Prior::binary(1.0, 0.3).unwrap(),
+            Noise::independent_with_deviations(&[1.0; 3]).unwrap(),
+        )
+        .unwrap();
+        let system = System::identical(model, Quantizer::new(vec![0.5]).unwrap()).unwrap();
+        let table = JointTable::new(&system).unwrap();
+        let entropy = -(0.3 * f64::ln(0.3) + 0.7 * f64::ln(0.7));
+        let sum = table.equivocation().unwrap() + system.value(Criterion::MutualInformation).unwrap();
+        assert!((sum - entropy).abs() < 1e-14);
+        assert_eq!(table.outcome(&[0, 1, 0]), table.outcome(&[1, 0, 0]));
+        assert!(table.likelihood(usize::MAX).is_empty() && table.probability(usize::MAX) == 0.0);
     }
 }

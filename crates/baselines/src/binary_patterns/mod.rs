@@ -7,6 +7,8 @@ mod decoders;
 mod information;
 mod luo;
 mod multi_threshold;
+mod rate_distortion;
+mod separation;
 mod strategies;
 
 pub use adaptive::{AdaptiveErrors, AdaptiveRule, adaptive, bounded_mle};
@@ -14,7 +16,9 @@ pub use decoders::Decoder;
 pub use information::printed_crlb;
 pub use luo::{Luo, LuoErrors};
 pub use multi_threshold::{MultiThreshold, multi_threshold_bound};
-pub use strategies::{by_information, tile};
+pub use rate_distortion::{RemoteDistortion, network_rate_distortion, remote_distortion};
+pub use separation::check_separation;
+pub use strategies::{by_information, tile, with_basis};
 
 use fewbits_binary_patterns::Error;
 use fewbits_binary_patterns::engine::Kind;

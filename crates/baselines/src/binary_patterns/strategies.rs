@@ -3,8 +3,32 @@
 use super::information::mean_information;
 use fewbits_binary_patterns::Error;
 use fewbits_binary_patterns::engine::{grid_bits, sensors_of};
+use fewbits_binary_patterns::search::{LinearSearch, MaskSet};
 use fewbits_binary_patterns::{Bank, CellGrid, Mask, Source};
 use fewbits_numerics::error::refuse;
+
+/// Number of sets that are evaluated on the fine nodes.
+const FINALISTS: usize = 16;
+
+/// Strategy 1: the best of all sets that contain the `forced` masks, for instance the Gray basis, as often as they are listed.
+///
+/// # Errors
+/// As [`LinearSearch::ranking`], or if no set contains the masks.
+pub fn with_basis(search: &LinearSearch, forced: &[Mask]) -> Result<MaskSet, Error> {
+    let times = |masks: &[Mask], mask: Mask| masks.iter().filter(|m| **m == mask).count();
+    let contains = |set: &MaskSet| forced.iter().all(|m| times(&set.masks, *m) >= times(forced, *m));
+    let mut found: Vec<MaskSet> = search.ranking()?.into_iter().filter(contains).take(FINALISTS).collect();
+    for set in &mut found {
+        set.mse = search.bank(&set.masks)?.mmse()?;
+    }
+    // Of equally good sets the one with the lowest masks is taken.
+    let least = found.iter().map(|set| set.mse).fold(f64::INFINITY, f64::min);
+    let best = found.into_iter().filter(|set| set.mse <= least * (1.0 + 1e-12));
+    match best.min_by(|a, b| a.masks.cmp(&b.masks)) {
+        Some(best) => Ok(best),
+        None => refuse("forced", format!("{forced:?}"), "masks that are in a set of the search"),
+    }
+}
 
 /// Strategy 2: repeats the masks of a smaller optimal set, in increasing order, until there are `sensors` of them.
 ///
@@ -58,6 +82,26 @@ pub fn by_information(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fewbits_binary_patterns::gray_basis;
+
+    #[test]
+    fn forced_masks_are_kept() {
+        let source = Source::uniform(1.0).unwrap();
+        let noise = source.noise_deviation(4.0).unwrap();
+        let search = LinearSearch::with_deviation(source, CellGrid::uniform(1.0, 3).unwrap(), noise, 5).unwrap();
+        let gray = gray_basis(3).unwrap();
+        let forced = with_basis(&search, &gray).unwrap();
+        assert!(gray.iter().all(|g| forced.masks.contains(g)));
+        // The Gray basis and each pair of the seven masks.
+        let mut least = f64::INFINITY;
+        for (a, b) in (1..8).flat_map(|a| (a..8).map(move |b| (a, b))) {
+            let masks = [gray.as_slice(), &[a, b]].concat();
+            least = least.min(search.bank(&masks).unwrap().mmse().unwrap());
+        }
+        assert!((forced.mse / least - 1.0).abs() < 1e-12);
+        assert!(with_basis(&search, &[1, 1, 1]).is_ok() && with_basis(&search, &[1, 1, 1, 1]).is_err());
+        assert!(with_basis(&search, &[8]).is_err());
+    }
 
     #[test]
     fn tiles_keep_the_multiplicities() {

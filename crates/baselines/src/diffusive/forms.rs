@@ -5,14 +5,13 @@ use super::series::polynomials::check_degree;
 use super::series::{Lpg, LpgFit, Slice};
 use fewbits_core::{Belief, Density, Gaussian, Likelihood};
 use fewbits_densities::{Component, Mixture, systematic};
-use fewbits_diffusive::engine;
 use fewbits_diffusive::form::{Added, AddedDensity, AddedForm, SliceMoments, Update};
 use fewbits_diffusive::message::AddedNumbers;
 use fewbits_diffusive::{
     Error, Form, JointBelief, PositionBelief, Posterior, RateModel, SearchBox, SourceLikelihood, Travelling,
 };
 use fewbits_mixture_codec::{Clumps, MixtureFit};
-use fewbits_numerics::error::{entries, refuse};
+use fewbits_numerics::error::{at_least_one, entries, refuse};
 use nalgebra::{SMatrix, SVector, Vector2};
 use std::fmt;
 use std::sync::Arc;
@@ -23,6 +22,10 @@ const CLUMPS: usize = 200;
 const WIDENING: f64 = 1.3;
 /// A Gaussian times a polynomial is wider: its box is that of a Gaussian with this many times the variance.
 const REACH: f64 = 1.7;
+/// Half width, in standard deviations, of the box that is taken to contain a Gaussian.
+const ENDS: f64 = 6.5;
+/// Largest number of components in a message: it has five bits, of which the largest number stands for a mixture.
+const MAX_COUNT: usize = 31;
 
 /// Gaussians times polynomials ([`Lpg`]): at most `N` components of degree `K`.
 pub const fn lpg<const N: usize, const K: usize>() -> Form {
@@ -66,16 +69,30 @@ fn position_only(form: &impl fmt::Debug, rate: &RateModel) -> Result<(), Error> 
     }
 }
 
+/// Whether a message can hold so many components.
+fn check_components(count: usize) -> Result<(), Error> {
+    at_least_one("components", count)?;
+    if count > MAX_COUNT {
+        return refuse("components", count, format!("at most {MAX_COUNT}, the largest number in a message"));
+    }
+    Ok(())
+}
+
+/// Numbers of one Gaussian of this dimension: its mean and the lower triangle of its Cholesky factor.
+const fn gaussian_scalars(dimension: usize) -> usize {
+    dimension + dimension * (dimension + 1) / 2
+}
+
 /// Numbers of one polynomial Gaussian over the position, or over position and rate: those of the Gaussian and the coefficients.
 fn scalars(degree: usize, with_rate: bool) -> usize {
     let plane = (degree + 1) * (degree + 2) / 2;
     let coefficients = if with_rate { plane * (degree + 3) / 3 } else { plane };
-    engine::gaussian_scalars(with_rate) + coefficients
+    gaussian_scalars(if with_rate { 3 } else { 2 }) + coefficients
 }
 
 impl<const N: usize, const K: usize> AddedForm for LpgForm<N, K> {
     fn check(&self, _: &RateModel) -> Result<(), Error> {
-        engine::check_components(N)?;
+        check_components(N)?;
         check_degree(K)?;
         Ok(())
     }
@@ -107,7 +124,7 @@ impl<const N: usize, const K: usize> AddedForm for LpgForm<N, K> {
 }
 
 fn read<const D: usize>(added: &AddedNumbers) -> Result<Lpg<D>, Error> {
-    let size = engine::gaussian_scalars(D == 3);
+    let size = gaussian_scalars(D);
     let numbers = &added.numbers;
     let (gaussians, coefficients) = numbers.split_at(size.saturating_mul(added.components).min(numbers.len()));
     let gaussians: Vec<Component<D>> = gaussians.chunks(size).map(read_gaussian).collect::<Result<_, _>>()?;
@@ -127,7 +144,7 @@ fn push_gaussian<const D: usize>(c: &Component<D>, numbers: &mut Vec<f64>) {
 
 /// The Gaussian of these numbers.
 fn read_gaussian<const D: usize>(numbers: &[f64]) -> Result<Component<D>, Error> {
-    entries("numbers", numbers.len(), engine::gaussian_scalars(D == 3))?;
+    entries("numbers", numbers.len(), gaussian_scalars(D))?;
     let (mean, mut rest) = numbers.split_at(D);
     let mut lower = SMatrix::<f64, D, D>::zeros();
     for i in 0..D {
@@ -195,7 +212,18 @@ where
     }
 
     fn bounds(&self) -> SearchBox {
-        engine::bounds(self.gaussians(), REACH)
+        let mut hull = SearchBox {
+            lower: [f64::INFINITY; 2],
+            upper: [f64::NEG_INFINITY; 2],
+        };
+        for part in self.gaussians() {
+            for d in 0..2 {
+                let reach = ENDS * (REACH * part.covariance()[(d, d)]).sqrt();
+                hull.lower[d] = hull.lower[d].min(part.mean()[d] - reach);
+                hull.upper[d] = hull.upper[d].max(part.mean()[d] + reach);
+            }
+        }
+        hull
     }
 
     fn log_density(&self, x: &SVector<f64, D>) -> f64 {
@@ -239,12 +267,12 @@ impl Third for Lpg<3> {
 
 impl<const N: usize> AddedForm for ParticlesForm<N> {
     fn check(&self, rate: &RateModel) -> Result<(), Error> {
-        engine::check_components(N)?;
+        check_components(N)?;
         position_only(self, rate)
     }
 
     fn scalars(&self, _: &RateModel) -> usize {
-        (N * (1 + engine::gaussian_scalars(false))).saturating_sub(1)
+        (N * (1 + gaussian_scalars(2))).saturating_sub(1)
     }
 
     /// Points at equal steps of the cumulative weight in the order of the cells, with a Gaussian kernel of the normal-reference width. The
@@ -271,7 +299,7 @@ impl AddedForm for LaplaceForm {
     }
 
     fn scalars(&self, _: &RateModel) -> usize {
-        engine::gaussian_scalars(false)
+        gaussian_scalars(2)
     }
 
     fn project(

@@ -4,8 +4,9 @@
 //! is then the one with the largest of a few functions `D_z(y)`. The alternating algorithm uses this.
 
 use fewbits_numerics::error::refuse;
-use fewbits_quantizer_design::engine::{Active, LOG_FLOOR, Problem, log_likelihoods};
-use fewbits_quantizer_design::outcomes::{Table, moments};
+use fewbits_numerics::{kernels, normal};
+use fewbits_quantizer_design::engine::{Active, LOG_FLOOR, Problem};
+use fewbits_quantizer_design::outcomes::{Table, for_each_log, moments};
 use fewbits_quantizer_design::system::SensorGroup;
 use fewbits_quantizer_design::{Channel, Criterion, Error, ObservationModel, System};
 
@@ -109,6 +110,55 @@ fn level_gains<'a>(
     }
     // The gain of a level is the mean gain of the symbols into which the channel turns it.
     Table::new(per_symbol, nodes).mixed(channel.inputs(), |z, t| channel.probability(t, z))
+}
+
+/// `ln P(outcome | x_k)` for every joint outcome, outcomes by values. It stays accurate if the probabilities underflow. The caller checks
+/// the number of outcomes.
+///
+/// # Errors
+/// As [`Active::new`].
+pub(crate) fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
+    let counts = |(index, group): (usize, &SensorGroup)| {
+        let logs = log_symbols(&Active::new(system, index)?, group);
+        Ok(logs.of_log_counts(group.sensors.len()))
+    };
+    let tables: Vec<Table> = system
+        .groups()
+        .iter()
+        .enumerate()
+        .map(counts)
+        .collect::<Result<_, Error>>()?;
+    let given = system.model().given();
+    let nodes = tables.first().map_or(0, |table| table.nodes);
+    let mut out = Vec::new();
+    for_each_log(&tables, &vec![0.0; nodes], |_, row| {
+        // With correlated noise each value is a mixture over nodes: log-sum-exp over the nodes of the value.
+        for feature in given {
+            let logs = row[feature.start..].iter().zip(&feature.weights);
+            let terms: Vec<f64> = logs.filter(|(_, w)| **w > 0.0).map(|(l, w)| l + w.ln()).collect();
+            out.push(kernels::log_sum_exp(&terms));
+        }
+    });
+    Ok(out)
+}
+
+/// Logarithms of the probabilities of a sensor's symbols at each node.
+fn log_symbols(own: &Active<'_>, group: &SensorGroup) -> Table {
+    let edges: Vec<f64> = own.breakpoints().iter().copied().chain([f64::INFINITY]).collect();
+    let labels = group.quantizer.labels();
+    let mut values = Vec::new();
+    for t in 0..group.channel.outputs() {
+        values.extend(own.means.iter().map(|m| {
+            let mut low = f64::NEG_INFINITY;
+            let cells = edges.iter().zip(labels).map(|(edge, label)| {
+                let high = (edge - m) / own.deviation;
+                let inside = normal::log_interval(std::mem::replace(&mut low, high), high);
+                inside + group.channel.probability(t, *label).ln()
+            });
+            kernels::log_sum_exp(&cells.collect::<Vec<_>>())
+        }));
+    }
+    Table::new(values, own.means.len())
 }
 
 /// Score of the decoder for one outcome, for each value of the unknown.

@@ -1,9 +1,9 @@
 //! The smallest error that `N` bits allow if one encoder sees all measurements.
 
-use super::rate_distortion::ConditionalMean;
+use super::conditional_mean::ConditionalMean;
 use crate::Error;
 use crate::Source;
-use fewbits_numerics::error::{at_least_one, positive, refuse};
+use fewbits_numerics::error::{positive, refuse};
 use fewbits_numerics::newton;
 use fewbits_quantizers::density::{CellMoments, Density};
 use fewbits_quantizers::lloyd_max;
@@ -24,27 +24,12 @@ pub fn centralised_bound(source: &Source, noise_deviation: f64, sensors: usize) 
     if !(1..=MAX_SENSORS).contains(&sensors) {
         return refuse("sensors", sensors, "a number of sensors in 1..=12");
     }
-    centralised_bound_of_levels(source, noise_deviation, sensors, 1 << sensors)
-}
-
-/// As [`centralised_bound`], for `measurements` measurements that are together described by one of `levels` symbols: several levels for one
-/// measurement, or few symbols for many.
-///
-/// # Errors
-/// If `noise_deviation` is not positive and finite, `measurements` is 0, `levels` not in `2..=4096`, or the quantizer's iteration fails.
-pub(crate) fn centralised_bound_of_levels(
-    source: &Source,
-    noise_deviation: f64,
-    measurements: usize,
-    levels: usize,
-) -> Result<f64, Error> {
-    at_least_one("measurements", measurements)?;
     let measurement = ConditionalMean::with_deviation(
         *source,
-        positive("noise_deviation", noise_deviation)? / (measurements as f64).sqrt(),
+        positive("noise_deviation", noise_deviation)? / (sensors as f64).sqrt(),
     )?;
     let estimate = EstimateDensity::new(measurement);
-    let quantizer = lloyd_max::design(&estimate, levels)?;
+    let quantizer = lloyd_max::design(&estimate, 1 << sensors)?;
     Ok(measurement.estimation_error() + quantizer.mean_squared_error())
 }
 
@@ -139,16 +124,15 @@ mod tests {
     }
 
     #[test]
-    fn several_levels_of_one_measurement_are_bounded_too() {
-        let source = Source::gaussian_with_deviation(0.5).unwrap();
+    fn the_estimate_of_one_measurement_has_any_number_of_levels() {
+        let measurement = ConditionalMean::with_deviation(Source::gaussian_with_deviation(0.5).unwrap(), 0.4).unwrap();
         let gain = 0.25 / (0.25 + 0.16);
+        assert_relative_eq!(measurement.estimation_error(), gain * 0.16, max_relative = 1e-9);
         for levels in [2, 3, 5, 16] {
-            let bound = centralised_bound_of_levels(&source, 0.4, 1, levels).unwrap();
+            let found = lloyd_max::design(&EstimateDensity::new(measurement), levels).unwrap();
             let table = lloyd_max::gaussian(levels).unwrap().mean_squared_error();
-            assert_relative_eq!(bound, gain * 0.16 + gain * 0.25 * table, max_relative = 1e-9);
+            assert_relative_eq!(found.mean_squared_error(), gain * 0.25 * table, max_relative = 1e-9);
         }
-        assert!(centralised_bound_of_levels(&source, 0.4, 0, 4).is_err());
-        assert!(centralised_bound_of_levels(&source, 0.4, 1, 1).is_err());
     }
 
     #[test]

@@ -120,8 +120,6 @@ pub fn grid_bits(grid: &CellGrid) -> Result<usize, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::check_separation;
-    use proptest::prelude::*;
 
     fn strings(masks: &[Mask], bits: usize) -> Vec<String> {
         masks
@@ -162,13 +160,5 @@ mod tests {
         assert!(linear_pattern(1, 0).is_err());
         assert!(linear_pattern(1, 17).is_err());
         assert!(gray_basis(0).is_err());
-    }
-
-    proptest! {
-        #[test]
-        fn full_rank_is_separation(masks in prop::collection::vec(1u32..16, 1..8)) {
-            let patterns: Vec<Pattern> = masks.iter().map(|&m| linear_pattern(m, 4).unwrap()).collect();
-            prop_assert_eq!(rank(&masks) == 4, check_separation(&patterns).is_ok());
-        }
     }
 }

@@ -3,7 +3,6 @@
 //! | task | function |
 //! |---|---|
 //! | best set of linear patterns, for small `B` and `N` | [`LinearSearch::best`], which tries all sets |
-//! | the same with the Gray basis fixed (strategy 1) | [`LinearSearch::with_forced`] |
 //! | large `B` or `N`, any patterns, unequal sensors | [`Descent`] |
 //! | thresholds that are not edges of a grid | [`free_breakpoints`] |
 

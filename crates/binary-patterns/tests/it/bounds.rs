@@ -1,7 +1,7 @@
 //! Orderings that must hold for every bank of one-bit sensors.
 
-use fewbits_baselines::binary_patterns::{Decoder, printed_crlb};
-use fewbits_binary_patterns::bounds::{centralised_bound, network_rate_distortion, optimal_weight_van_trees};
+use fewbits_baselines::binary_patterns::{Decoder, network_rate_distortion, printed_crlb};
+use fewbits_binary_patterns::bounds::{centralised_bound, optimal_weight_van_trees};
 use fewbits_binary_patterns::search::free_breakpoints;
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, CellGrid, PatternSensor, Source};
 use proptest::prelude::*;

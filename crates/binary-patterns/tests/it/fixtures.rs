@@ -3,11 +3,9 @@
 use crate::entry::{Entry, check};
 use fewbits_baselines::binary_patterns::{
     AdaptiveErrors, AdaptiveRule, Decoder, Luo, adaptive, by_information, count, fixed_threshold,
-    multi_threshold_bound, printed_crlb, printed_gaussian_cells,
+    multi_threshold_bound, network_rate_distortion, printed_crlb, printed_gaussian_cells, remote_distortion,
 };
-use fewbits_binary_patterns::bounds::{
-    centralised_bound, network_rate_distortion, optimal_weight_van_trees, remote_distortion,
-};
+use fewbits_binary_patterns::bounds::{centralised_bound, optimal_weight_van_trees};
 use fewbits_binary_patterns::search::{LinearSearch, MaskSet, free_breakpoints};
 use fewbits_binary_patterns::{
     Bank, CellGrid, Mask, Pattern, PatternSensor, Source, gray_basis, linear_pattern, natural_basis,

@@ -1,6 +1,8 @@
 //! Which sets of patterns separate the cells.
 
-use fewbits_binary_patterns::{Pattern, check_separation, gray_basis, linear_pattern};
+use fewbits_baselines::binary_patterns::check_separation;
+use fewbits_binary_patterns::{Pattern, gray_basis, linear_pattern, rank};
+use proptest::prelude::*;
 
 #[test]
 fn neighbouring_cells_of_gray_patterns_differ_in_one_bit() {
@@ -28,4 +30,12 @@ fn further_patterns_separate_with_the_gray_basis() {
 fn independent_patterns_that_are_not_linear_need_not_separate() {
     let patterns = ["00001111", "00110000", "01000000"].map(|text| text.parse::<Pattern>().unwrap());
     check_separation(&patterns).unwrap_err();
+}
+
+proptest! {
+    #[test]
+    fn full_rank_is_separation(masks in prop::collection::vec(1u32..16, 1..8)) {
+        let patterns: Vec<Pattern> = masks.iter().map(|&m| linear_pattern(m, 4).unwrap()).collect();
+        prop_assert_eq!(rank(&masks) == 4, check_separation(&patterns).is_ok());
+    }
 }

@@ -1,7 +1,7 @@
 //! Wild arguments: sources, grids, quantizers and banks answer numbers or errors.
 
-use fewbits_baselines::binary_patterns::{bounded_mle, printed_gaussian_cells};
-use fewbits_binary_patterns::bounds::{centralised_bound, remote_distortion};
+use fewbits_baselines::binary_patterns::{bounded_mle, printed_gaussian_cells, remote_distortion};
+use fewbits_binary_patterns::bounds::centralised_bound;
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, CellGrid, PatternSensor, Source};
 use fewbits_core::{Link, Observation, Scheme, factor::Factor, laws::wild};
 use proptest::prelude::*;

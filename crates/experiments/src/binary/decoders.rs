@@ -2,10 +2,8 @@
 
 use super::{ERROR, Scene, each, sweep, swept};
 use crate::prelude::*;
-use fewbits_baselines::binary_patterns::{Decoder, printed_crlb};
-use fewbits_binary_patterns::bounds::{
-    centralised_bound, network_rate_distortion, optimal_weight_van_trees, remote_distortion,
-};
+use fewbits_baselines::binary_patterns::{Decoder, network_rate_distortion, printed_crlb, remote_distortion};
+use fewbits_binary_patterns::bounds::{centralised_bound, optimal_weight_van_trees};
 use fewbits_binary_patterns::gray_basis;
 
 pub struct Decoders;

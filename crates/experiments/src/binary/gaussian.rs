@@ -2,8 +2,9 @@
 
 use super::{Scene, crossing, each, sweep, swept};
 use crate::prelude::*;
+use fewbits_baselines::binary_patterns::{network_rate_distortion, remote_distortion};
 use fewbits_binary_patterns::Mask;
-use fewbits_binary_patterns::bounds::{network_rate_distortion, optimal_weight_van_trees, remote_distortion};
+use fewbits_binary_patterns::bounds::optimal_weight_van_trees;
 
 pub struct GaussianSource;
 

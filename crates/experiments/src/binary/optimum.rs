@@ -2,7 +2,7 @@
 
 use super::{ERROR, Scene, crossing, descent_from, each, sweep, swept};
 use crate::prelude::*;
-use fewbits_baselines::binary_patterns::{Luo, by_information, tile};
+use fewbits_baselines::binary_patterns::{Luo, by_information, tile, with_basis};
 use fewbits_binary_patterns::{Mask, gray_basis};
 
 pub struct Optimum;
@@ -68,7 +68,7 @@ fn row(bits: usize, sensors: usize, snr_db: f64) -> Result<Row, Error> {
         masks: List(best.masks),
         mse_unconstrained: any.mse,
         masks_unconstrained: List(any.masks),
-        mse_strategy1: search.with_forced(&gray)?.best()?.mse,
+        mse_strategy1: with_basis(&search, &gray)?.mse,
         mse_strategy13: informed(&gray)?,
         mse_strategy3: informed(&[])?,
         luo_soft: luo.as_ref().map(|e| e.soft),

@@ -2,8 +2,8 @@
 
 use super::{Scene, each, pattern, pattern_panel, sweep};
 use crate::prelude::*;
-use fewbits_baselines::binary_patterns::{Decoder, count};
-use fewbits_binary_patterns::{Pattern, check_separation, mask_of};
+use fewbits_baselines::binary_patterns::{Decoder, check_separation, count};
+use fewbits_binary_patterns::{Pattern, mask_of};
 
 pub struct Table;
 

@@ -1,6 +1,7 @@
 //! What the tables of this system share: scenes, starting quantizers, rows of designs and their panel.
 
 use crate::prelude::*;
+use fewbits_baselines::quantizer_design::random_starts;
 use fewbits_quantizer_design::design::{self, Design};
 use fewbits_quantizer_design::{
     Channel, Criterion, Error as Refused, Labelling, Newton, Noise, ObservationModel, Prior, Quantizer, System,
@@ -31,7 +32,7 @@ pub(super) fn arrived(about: &System, criterion: Criterion, starts: usize, best:
     let reached = |start: &&System| {
         design::joint(start, criterion, &Newton::default()).is_ok_and(|d| (d.value - best.value).abs() < 1e-10)
     };
-    design::random_starts(about, starts, 1).iter().filter(reached).count()
+    random_starts(about, starts, 1).iter().filter(reached).count()
 }
 
 /// Sensors with the odd quantizers of these positive breakpoints and one at zero.

@@ -3,7 +3,7 @@
 use super::common::{MI, MSE, Pair, arrived, errors, lloyd_system, odd, scene};
 use crate::prelude::*;
 use fewbits_baselines::quantizer_design as baselines;
-use fewbits_quantizer_design::{Newton, bounds, design};
+use fewbits_quantizer_design::{Newton, design};
 
 parameters! {
     pub struct Parameters {
@@ -78,13 +78,13 @@ impl Figure for Table41 {
                 let greedy = baselines::greedy(&sample, &[0, 1], criterion, &newton)?.swap_remove(1);
                 push(method, "greedy", Pair::of(&greedy.system)?);
                 let nearest = design::joint(&greedy.system, criterion, &Newton::to_nearest_stationary_point())?;
-                let best = design::multi_start(&sample, criterion, p.starts, 1, &newton)?;
+                let best = baselines::multi_start(&sample, criterion, p.starts, 1, &newton)?;
                 push(method, if correlated { "symmetric" } else { "joint" }, Pair::joint(&nearest)?);
                 if correlated {
                     push(method, "joint", Pair::joint(&best)?);
                 }
                 push(method, "printed", Pair::of(&odd(&sample, printed)?)?);
-                let van_trees = || bounds::bayesian_cramer_rao(&best.system);
+                let van_trees = || baselines::bayesian_cramer_rao(&best.system);
                 rows.searches.push(Search {
                     case,
                     criterion: method,

@@ -2,9 +2,8 @@
 
 use super::common::MI;
 use crate::prelude::*;
-use fewbits_baselines::quantizer_design::{self as baselines, Separation};
+use fewbits_baselines::quantizer_design::{self as baselines, NeymanPearson, Separation};
 use fewbits_numerics::normal;
-use fewbits_quantizer_design::decoder::NeymanPearson;
 use fewbits_quantizer_design::{
     Channel, Criterion, JointTable, Newton, Noise, ObservationModel, Prior, Quantizer, System, design,
 };

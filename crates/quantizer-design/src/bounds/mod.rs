@@ -5,18 +5,11 @@
 //! | remote distortion-rate (2.15) | any code of one noisy source, any block length | [`remote_distortion_rate`] |
 //! | quadratic Gaussian CEO | any codes at separate sensors with independent noise | [`ceo`] |
 //! | unquantised samples | any quantizers | [`unquantised`] |
-//! | Bayesian Cramer-Rao (van Trees, constant weight) | these quantizers, any estimator | [`bayesian_cramer_rao`] |
-//!
-//! The Cramer-Rao bound `1 / J(x)` is for unbiased estimators of a fixed `x`. The posterior mean is biased towards the prior
-//! and can have a smaller error. For a random unknown use the van Trees inequality.
 
 mod ceo;
-mod fisher;
 mod unquantised;
 
 pub use ceo::{CeoBound, ceo};
-pub use fisher::{bayesian_cramer_rao, mean_fisher_information};
-
 pub use unquantised::unquantised;
 
 use crate::error::{Error, refuse};

@@ -210,21 +210,13 @@ impl ObservationModel {
         Self::new(self.prior.clone(), self.noise.subset(sensors)?)
     }
 
-    pub(crate) fn is_independent(&self) -> bool {
-        self.noise.is_independent()
-    }
-
-    pub(crate) fn is_discrete(&self) -> bool {
-        self.prior.is_discrete()
-    }
-
     pub(crate) fn nodes(&self) -> usize {
         self.nodes.len()
     }
 
     /// Mean of sensor `n`'s sample at each node, and its standard deviation there.
     pub(crate) fn sample_law(&self, n: usize) -> (Vec<f64>, f64) {
-        let (loading, deviation) = if self.is_independent() {
+        let (loading, deviation) = if self.noise.is_independent() {
             (0.0, self.noise.deviation(n))
         } else {
             (self.noise.loadings[n], self.noise.residuals[n])

@@ -177,7 +177,8 @@ impl Noise {
         Self::one_factor_with_deviations(&times(&self.loadings), &times(&self.residuals))
     }
 
-    pub(crate) fn is_independent(&self) -> bool {
+    /// Whether the noises of the sensors are independent.
+    pub fn is_independent(&self) -> bool {
         self.sensors() == 1 || self.loadings.iter().filter(|a| **a != 0.0).count() < 2
     }
 }

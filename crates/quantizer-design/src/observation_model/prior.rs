@@ -254,7 +254,7 @@ impl Prior {
     }
 
     /// Whether the unknown is normal.
-    pub(crate) fn is_normal(&self) -> bool {
+    pub fn is_normal(&self) -> bool {
         matches!(self.shape, Shape::Gaussian { .. })
     }
 

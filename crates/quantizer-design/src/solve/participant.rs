@@ -54,6 +54,14 @@ impl SensorDesign {
             .collect()
     }
 
+    /// Its cells and words.
+    pub(super) fn cells(&self) -> WordedCells {
+        WordedCells {
+            breakpoints: self.breakpoints.clone(),
+            words: self.words.clone(),
+        }
+    }
+
     /// The channel from words to received symbols: the words, and one more symbol "missing" if the link can lose words.
     pub(super) fn law(&self) -> Result<Channel, Error> {
         let words = 1u64 << self.bits;

@@ -95,10 +95,9 @@ impl TryFrom<Stored> for Solution {
     fn try_from(stored: Stored) -> Result<Self, Error> {
         let (system, sensors, value) = (stored.system, stored.sensors, stored.value);
         for sensor in &sensors {
-            let (edges, bits) = (&sensor.breakpoints, sensor.bits);
-            let increasing = edges.iter().all(|x| x.is_finite()) && edges.windows(2).all(|pair| pair[0] < pair[1]);
+            let bits = sensor.bits;
             let known = (1..=MAX_BITS).contains(&bits) && sensor.words.iter().all(|word| *word < 1 << bits);
-            if !(increasing && known && sensor.words.len() == edges.len() + 1) {
+            if !known || sensor.cells().check().is_err() {
                 let expected = "increasing breakpoints, and a word of its bits for each cell";
                 return refuse("sensors", format!("cells of sensor {}", sensor.sensor), expected);
             }
@@ -220,11 +219,7 @@ impl Solution {
 
     /// Cells and words of every sensor.
     pub(super) fn cells(&self) -> Vec<WordedCells> {
-        let cells = self.sensors.iter().map(|s| WordedCells {
-            breakpoints: s.breakpoints.clone(),
-            words: s.words.clone(),
-        });
-        cells.collect()
+        self.sensors.iter().map(SensorDesign::cells).collect()
     }
 
     /// The design as a text table: sensors, cells, words, value, bound and certificate.

@@ -202,7 +202,7 @@ proptest! {
         let ceo = bounds::ceo(model.prior(), model.noise(), &[2.0, 2.0]).unwrap();
         let system = System::ideal(model, vec![q.clone(), q]).unwrap();
         let mse = system.value(MSE).unwrap();
-        prop_assert!(mse > bounds::bayesian_cramer_rao(&system).unwrap());
+        prop_assert!(mse > baselines::bayesian_cramer_rao(&system).unwrap());
         prop_assert!(mse > ceo.distortion);
     }
 

@@ -5,7 +5,7 @@ use fewbits_quantizer_design::design::{self, Design};
 use fewbits_quantizer_design::table::JointTable;
 use fewbits_quantizer_design::{
     Channel, Criterion, Labelling, Newton, Noise, ObservationModel, Prior, Quantizer, System, bounds, canonical,
-    decoder::NeymanPearson, lloyd_max,
+    lloyd_max,
 };
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -191,8 +191,13 @@ fn van_trees(entry: &Entry) {
     let model = ObservationModel::gaussian_with_deviations(1.0, &vec![number(&entry.inputs["sigma"]); n]).unwrap();
     let q = Quantizer::new(numbers(&entry.inputs["breakpoints"])).unwrap();
     let system = System::identical(model, q).unwrap();
-    close(entry, "fisher", bounds::mean_fisher_information(&system).unwrap(), number(&entry.value["fisher"]));
-    let bound = bounds::bayesian_cramer_rao(&system).unwrap();
+    close(
+        entry,
+        "fisher",
+        baselines::mean_fisher_information(&system).unwrap(),
+        number(&entry.value["fisher"]),
+    );
+    let bound = baselines::bayesian_cramer_rao(&system).unwrap();
     close(entry, "bound", bound, number(&entry.value["bound"]));
     assert!(bound < system.value(MSE).unwrap());
 }
@@ -317,7 +322,7 @@ fn pair(entry: &Entry) {
         assert!(design.is_saddle());
         check_design(entry, &design);
     } else if id.contains("bestcontiguous") {
-        let design = design::multi_start(&sample, criterion, 12, 1, &plain).unwrap();
+        let design = baselines::multi_start(&sample, criterion, 12, 1, &plain).unwrap();
         assert!(!design.is_saddle());
         check_design(entry, &design);
     } else if id.contains("modulo") || id.contains("gray") {
@@ -405,7 +410,9 @@ fn detection(entry: &Entry) {
         return close(entry, "Q", q, number(&entry.value));
     }
     if kind == "np" {
-        let test = NeymanPearson::new(&five(separated(Separation::Matusita)), number(&entry.inputs["alpha"])).unwrap();
+        let test =
+            baselines::NeymanPearson::new(&five(separated(Separation::Matusita)), number(&entry.inputs["alpha"]))
+                .unwrap();
         return close(entry, "P_d", test.detection_probability(), number(&entry.value));
     }
     if kind == "MIgreedy" {
@@ -623,7 +630,7 @@ fn folded(entry: &Entry) {
 
 fn contiguous(entry: &Entry) {
     let start = System::ideal(low_noise(entry), vec![lloyd(4, 1.1); 2]).unwrap();
-    check_design(entry, &design::multi_start(&start, MSE, 14, 1, &Newton::default()).unwrap());
+    check_design(entry, &baselines::multi_start(&start, MSE, 14, 1, &Newton::default()).unwrap());
 }
 
 fn modulo_or_monte_carlo(entry: &Entry) {

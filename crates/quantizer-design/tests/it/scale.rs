@@ -92,7 +92,7 @@ fn saddles_are_left_in_every_unit() {
 fn searches_know_no_unit() {
     law(MSE, 1e-6, |s| {
         let start = System::lloyd_max(equal_pair(0.0, s), 3).unwrap();
-        let best = design::multi_start(&start, MSE, 4, 1, &Newton::default()).unwrap();
+        let best = baselines::multi_start(&start, MSE, 4, 1, &Newton::default()).unwrap();
         Design { iterations: 0, ..best }
     });
     let folded = |s: f64| {

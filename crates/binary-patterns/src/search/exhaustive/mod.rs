@@ -75,7 +75,7 @@ impl LinearSearch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{CellGrid, Source, gray_basis};
+    use crate::{CellGrid, Source};
     use approx::assert_relative_eq;
 
     fn search(bits: usize, sensors: usize, snr: f64) -> LinearSearch {
@@ -111,21 +111,9 @@ mod tests {
     }
 
     #[test]
-    fn forced_masks_are_kept() {
-        let gray = gray_basis(3).unwrap();
-        let all = search(3, 5, 4.0).ranking().unwrap();
-        let forced = search(3, 5, 4.0).with_forced(&gray).unwrap().ranking().unwrap();
-        assert_eq!(forced.len(), 28, "as many as pairs of seven masks");
-        let expected = all.iter().find(|s| gray.iter().all(|g| s.masks.contains(g))).unwrap();
-        assert_eq!(forced[0].masks, expected.masks);
-        assert_relative_eq!(forced[0].mse, expected.mse, max_relative = 1e-12);
-    }
-
-    #[test]
     fn too_few_sensors_for_full_rank_is_an_error() {
         assert!(matches!(search(3, 2, 10.0).best(), Err(Error::Argument(e)) if e.name == "sensors"));
         assert_eq!(search(3, 2, 10.0).any_rank().best().unwrap().masks.len(), 2);
-        assert!(search(3, 2, 10.0).with_forced(&[1, 2, 3]).is_err());
         // Two masks do not tell eight cells apart.
         for refused in [
             search(3, 2, 10.0).best().map(|set| vec![set]),
@@ -133,7 +121,6 @@ mod tests {
         ] {
             assert!(refused.unwrap_err().to_string().contains("sensors"));
         }
-        assert!(search(3, 2, 10.0).with_forced(&[8]).is_err());
         let grid = CellGrid::from_breakpoints(vec![0.0, 1.0]).unwrap();
         assert!(LinearSearch::with_deviation(Source::uniform(1.0).unwrap(), grid, 0.1, 3).is_err());
         assert!(matches!(search(10, 12, 10.0).best(), Err(Error::TooLarge { .. })));

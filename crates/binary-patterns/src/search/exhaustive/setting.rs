@@ -1,6 +1,6 @@
 //! The search space of an exhaustive search.
 
-use crate::patterns::linear::{check_mask, grid_bits, sensors_of};
+use crate::patterns::linear::{grid_bits, sensors_of};
 use crate::{Bank, CellGrid, Error, Mask, PatternSensor, Source};
 use fewbits_numerics::binomial;
 use fewbits_numerics::error::{at_least_one, positive};
@@ -36,7 +36,6 @@ pub struct LinearSearch {
     pub(super) noise_deviation: f64,
     pub(super) sensors: usize,
     pub(super) full_rank: bool,
-    pub(super) forced: Vec<usize>,
 }
 
 impl LinearSearch {
@@ -53,7 +52,6 @@ impl LinearSearch {
             noise_deviation: positive("noise_deviation", noise_deviation)?,
             sensors,
             full_rank: true,
-            forced: vec![0; (1 << bits) - 1],
             grid,
         })
     }
@@ -65,20 +63,7 @@ impl LinearSearch {
         self
     }
 
-    /// Requires these masks in every set, as often as they are listed. With the Gray basis this is strategy 1.
-    ///
-    /// # Errors
-    /// If a mask is out of range or there are more of them than sensors.
-    pub fn with_forced(mut self, masks: &[Mask]) -> Result<Self, Error> {
-        self.forced.fill(0);
-        for &mask in masks {
-            self.forced[check_mask(mask, self.bits)? as usize - 1] += 1;
-        }
-        at_least_one("sensors", (self.sensors + 1).saturating_sub(masks.len()))?;
-        Ok(self)
-    }
-
-    /// Number of sets of any rank, without regard to required masks: an upper bound of those that are searched.
+    /// Number of sets of any rank: an upper bound of those that are searched.
     pub(crate) fn sets(&self) -> u64 {
         binomial::saturating((1 << self.bits) - 2 + self.sensors, self.sensors)
     }

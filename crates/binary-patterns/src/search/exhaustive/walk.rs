@@ -68,15 +68,12 @@ pub(super) struct Walk<'a> {
     tables: Vec<Vec<Table>>,
     /// `leaves[r - 1]`: the integrands of all masks for `r` remaining sensors.
     leaves: Vec<DMatrix<f64>>,
-    /// Number of sensors whose masks are required, from mask `j + 1` on.
-    forced_from: Vec<usize>,
 }
 
 impl<'a> Walk<'a> {
     pub(super) fn new(search: &'a LinearSearch, keep: usize) -> Result<Self, Error> {
-        let kinds = search.forced.len();
-        let quantizers = (1..=kinds)
-            .map(|mask| linear_pattern(mask as Mask, search.bits)?.on(&search.grid))
+        let quantizers = (1..1 << search.bits)
+            .map(|mask| linear_pattern(mask, search.bits)?.on(&search.grid))
             .collect::<Result<Vec<_>, _>>()?;
         let candidates = Candidates::new(&search.source, &quantizers, &[search.noise_deviation]);
         let tables_of = |quantizer: &BinaryQuantizer| {
@@ -87,11 +84,6 @@ impl<'a> Walk<'a> {
         let leaves = (0..search.sensors)
             .map(|r| candidates.integrands(tables.iter().map(|t| &t[r])))
             .collect();
-        // Number of sensors that must still get a required mask from j on; branches with fewer remaining sensors are cut.
-        let mut forced_from = vec![0; kinds + 1];
-        for j in (0..kinds).rev() {
-            forced_from[j] = forced_from[j + 1] + search.forced[j];
-        }
         Ok(Self {
             search,
             keep,
@@ -99,7 +91,6 @@ impl<'a> Walk<'a> {
             variance: search.source.variance(),
             tables,
             leaves,
-            forced_from,
         })
     }
 
@@ -115,19 +106,12 @@ impl<'a> Walk<'a> {
         let mut found = Top::new(self.keep);
         self.close(first, left, span, chosen, &level, &mut found);
         let mut steps = Vec::new();
-        for j in first..self.tables.len() {
-            let needed = self.search.forced[j].max(1);
-            for m in needed..left {
-                let next = span.with(j as Mask + 1);
-                // Each remaining sensor can raise the rank by at most one.
-                let possible = !self.search.full_rank || next.rank() + (left - m) >= self.search.bits;
-                if possible && left - m >= self.forced_from[j + 1] && j + 1 < self.tables.len() {
-                    steps.push((j, m, next));
-                }
-            }
-            if self.search.forced[j] > 0 {
-                break;
-            }
+        // The last mask has no later one.
+        for j in first..self.tables.len() - 1 {
+            let next = span.with(j as Mask + 1);
+            // Each remaining sensor can raise the rank by at most one.
+            let possible = |m: &usize| !self.search.full_rank || next.rank() + (left - m) >= self.search.bits;
+            steps.extend((1..left).filter(possible).map(|m| (j, m, next)));
         }
         let descend = |&(j, m, next): &(usize, usize, Span)| {
             let mut chosen = chosen.to_vec();
@@ -154,14 +138,8 @@ impl<'a> Walk<'a> {
         level: &Outcomes,
         found: &mut Top,
     ) {
-        let allowed = |j: usize| {
-            self.forced_from[j + 1] == 0
-                && left >= self.search.forced[j]
-                && (!self.search.full_rank || span.with(j as Mask + 1).rank() == self.search.bits)
-        };
-        let until = (first..self.tables.len())
-            .find(|&j| self.search.forced[j] > 0)
-            .map_or(self.tables.len(), |j| j + 1);
+        let allowed = |j: usize| !self.search.full_rank || span.with(j as Mask + 1).rank() == self.search.bits;
+        let until = self.tables.len();
         let Some(from) = (first..until).find(|&j| allowed(j)) else {
             return;
         };

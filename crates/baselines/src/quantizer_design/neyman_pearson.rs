@@ -1,12 +1,9 @@
 //! The most powerful test between two values of the unknown.
 
-use crate::error::{Error, refuse};
-use crate::law::log_likelihoods;
-use crate::system::System;
-use crate::table::JointTable;
+use super::gains::log_likelihoods;
 use fewbits_core::Observation;
-use fewbits_numerics::error::entries;
-use fewbits_quantizers::Symbol;
+use fewbits_numerics::error::{entries, refuse};
+use fewbits_quantizer_design::{Error, JointTable, Symbol, System};
 
 /// The randomised Neyman-Pearson test between two values of the unknown, given the joint outcome.
 ///
@@ -30,7 +27,7 @@ impl NeymanPearson {
         if !(false_alarm > 0.0 && false_alarm < 1.0) {
             return refuse("false_alarm", false_alarm, "a probability inside (0, 1)");
         }
-        if !system.model().is_discrete() || system.model().values().len() != 2 {
+        if !system.model().prior().is_discrete() || system.model().values().len() != 2 {
             return refuse("prior", "not two hypotheses", "a discrete prior on two values");
         }
         let table = JointTable::new(system)?;
@@ -91,7 +88,7 @@ impl NeymanPearson {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Criterion, Noise, ObservationModel, Prior, Quantizer};
+    use fewbits_quantizer_design::{Noise, ObservationModel, Prior, Quantizer};
 
     #[test]
     fn likelihood_ratios_are_ordered_by_their_logarithms() {
@@ -147,34 +144,5 @@ mod tests {
         assert!(test.acceptance(&[Observation::Lost; 2]).is_err());
         assert!(NeymanPearson::new(&system, 0.0).is_err());
         assert!(NeymanPearson::new(&system, 1.0).is_err());
-    }
-
-    /// If the probability of the wrong value is among the smallest numbers, its term of the entropy is zero, not infinite.
-    #[test]
-    fn equivocation_is_finite_where_probabilities_are_subnormal() {
-        for tenth in 700..800 {
-            let signal = f64::from(tenth) * 0.1;
-            let noise = Noise::independent_with_deviations(&[1.0]).unwrap();
-            let model = ObservationModel::new(Prior::binary(signal, 0.5).unwrap(), noise).unwrap();
-            let system = System::identical(model, Quantizer::new(vec![0.5 * signal]).unwrap()).unwrap();
-            let equivocation = JointTable::new(&system).unwrap().equivocation().unwrap();
-            assert!((0.0..1e-200).contains(&equivocation), "{equivocation} at {signal}");
-        }
-    }
-
-    #[test]
-    fn equivocation_and_information_make_up_the_prior_entropy() {
-        let model = ObservationModel::new(
-            Prior::binary(1.0, 0.3).unwrap(),
-            Noise::independent_with_deviations(&[1.0; 3]).unwrap(),
-        )
-        .unwrap();
-        let system = System::identical(model, Quantizer::new(vec![0.5]).unwrap()).unwrap();
-        let table = JointTable::new(&system).unwrap();
-        let entropy = -(0.3 * f64::ln(0.3) + 0.7 * f64::ln(0.7));
-        let sum = table.equivocation().unwrap() + system.value(Criterion::MutualInformation).unwrap();
-        assert!((sum - entropy).abs() < 1e-14);
-        assert_eq!(table.outcome(&[0, 1, 0]), table.outcome(&[1, 0, 0]));
-        assert!(table.likelihood(usize::MAX).is_empty() && table.probability(usize::MAX) == 0.0);
     }
 }

@@ -1,9 +1,11 @@
-//! Fisher information in the symbols, and the Bayesian Cramer-Rao bound.
+//! Fisher information in the symbols, and the Bayesian Cramer-Rao bound (van Trees, constant weight).
+//!
+//! The Cramer-Rao bound `1 / J(x)` is for unbiased estimators of a fixed `x`. The posterior mean is biased towards the prior
+//! and can have a smaller error. For a random unknown use the van Trees inequality.
 
-use super::prior_variance;
-use crate::error::{Error, refuse};
-use crate::law::Active;
-use crate::system::System;
+use fewbits_numerics::error::{positive, refuse};
+use fewbits_quantizer_design::engine::Active;
+use fewbits_quantizer_design::{Error, System};
 
 /// Fisher information about `x` in the received symbols, averaged over the prior, for independent noise.
 ///
@@ -13,12 +15,12 @@ use crate::system::System;
 /// [`Error::Argument`] if the noise is correlated.
 pub fn mean_fisher_information(system: &System) -> Result<f64, Error> {
     let model = system.model();
-    if !model.is_independent() {
+    if !model.noise().is_independent() {
         return refuse("noise", "correlated noise", "independent noise for a Fisher information");
     }
     let nodes = model.values().len();
     let mut information = vec![0.0; nodes];
-    for g in 0..system.groups().len() {
+    for (g, group) in system.groups().iter().enumerate() {
         let entry = Active::new(system, g)?;
         let densities = entry.densities(entry.breakpoints()).0;
         for (t, p) in entry.symbols(entry.breakpoints()).iter().enumerate() {
@@ -31,7 +33,7 @@ pub fn mean_fisher_information(system: &System) -> Result<f64, Error> {
                     .map(|(c, d)| c[t] * d[k])
                     .sum();
                 if p[k] > 0.0 {
-                    *total += entry.compositions.total as f64 * slope * (slope / p[k]);
+                    *total += group.sensors.len() as f64 * slope * (slope / p[k]);
                 }
             }
         }
@@ -44,14 +46,18 @@ pub fn mean_fisher_information(system: &System) -> Result<f64, Error> {
 /// # Errors
 /// [`Error::Argument`] if the noise is correlated or the prior is not Gaussian.
 pub fn bayesian_cramer_rao(system: &System) -> Result<f64, Error> {
-    let prior_variance = prior_variance(system.model().prior())?;
-    Ok(1.0 / (mean_fisher_information(system)? + 1.0 / prior_variance))
+    let prior = system.model().prior();
+    if !prior.is_normal() {
+        return refuse("prior", "another prior", "a Gaussian prior");
+    }
+    let variance = positive("prior variance", prior.deviation() * prior.deviation())?;
+    Ok(1.0 / (mean_fisher_information(system)? + 1.0 / variance))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ObservationModel, Quantizer};
+    use fewbits_quantizer_design::{ObservationModel, Quantizer};
 
     #[test]
     fn fine_quantizers_attain_the_information_of_the_sample() {

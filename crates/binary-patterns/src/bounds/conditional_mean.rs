@@ -1,12 +1,11 @@
-//! Remote rate-distortion bounds: the source is observed in noise, and a limited number of bits describes the observation.
+//! A source observed in noise: the conditional mean, and integrals over the observation.
 
 use crate::Error;
 use crate::Source;
 use crate::observation::source::Kind;
-use fewbits_numerics::error::{at_least_one, non_negative, positive};
+use fewbits_numerics::error::positive;
 use fewbits_numerics::normal::{interval, pdf, truncated_moments};
 use fewbits_numerics::quadrature::gauss_legendre;
-use std::f64::consts::{E, PI};
 
 /// Distance from the support, in noise standard deviations, beyond which the density of the measurement is negligible.
 const REACH: f64 = 9.0;
@@ -38,7 +37,8 @@ impl ConditionalMean {
     }
 
     /// Density of the measurement.
-    pub(super) fn measurement_density(&self, y: f64) -> f64 {
+    #[doc(hidden)]
+    pub fn measurement_density(&self, y: f64) -> f64 {
         match self.source.kind() {
             Kind::Uniform { half_width: v } if v < FAINT * self.noise_deviation => {
                 pdf(y / self.noise_deviation) / self.noise_deviation
@@ -72,7 +72,8 @@ impl ConditionalMean {
     }
 
     /// Half the width of the interval outside which the density of the measurement is negligible.
-    pub(super) fn measurement_reach(&self) -> f64 {
+    #[doc(hidden)]
+    pub fn measurement_reach(&self) -> f64 {
         match self.source.kind() {
             Kind::Uniform { half_width } => half_width + REACH * self.noise_deviation,
             Kind::Gaussian { deviation } => REACH * deviation.hypot(self.noise_deviation),
@@ -80,7 +81,8 @@ impl ConditionalMean {
     }
 
     /// `int_{from}^{to} p_Y(y) f(y, E[X|y], Var[X|y]) dy`.
-    pub(super) fn integrate(&self, from: f64, to: f64, mut f: impl FnMut(f64, f64, f64) -> f64) -> f64 {
+    #[doc(hidden)]
+    pub fn integrate(&self, from: f64, to: f64, mut f: impl FnMut(f64, f64, f64) -> f64) -> f64 {
         let (width, corner) = match self.source.kind() {
             Kind::Uniform { half_width } => (self.noise_deviation, half_width - REACH * self.noise_deviation),
             Kind::Gaussian { deviation } => (deviation.hypot(self.noise_deviation), 0.0),
@@ -108,67 +110,6 @@ impl ConditionalMean {
     }
 }
 
-/// Shannon's lower bound on the distortion at rate `R`: `D1 + Q1 2^(-2R)` (appendix B.1).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RemoteDistortion {
-    /// `D1 = E Var[X|Y]`.
-    pub estimation_error: f64,
-    /// `Q1 = 2^(2h) / (2 pi e)`, entropy power of `E[X|Y]`, with `h` its differential entropy in bits.
-    pub entropy_power: f64,
-}
-
-impl RemoteDistortion {
-    /// The bound at `rate` bits per source sample, in squared units of the source.
-    ///
-    /// # Errors
-    /// If the rate is negative or not finite.
-    pub fn at(&self, rate: f64) -> Result<f64, Error> {
-        let rate = non_negative("rate", rate)?;
-        Ok(self.estimation_error + self.entropy_power * (-2.0 * rate).exp2())
-    }
-}
-
-/// The remote rate-distortion bound for one measurement with noise `noise_deviation`.
-///
-/// The distortion is exactly the sum of `E Var[X|Y]` and the distortion of describing `E[X|Y]`: the cross term is
-/// zero by orthogonality, for every quantizer (erratum `binary-9`). The entropy is computed without inverse function:
-/// `h(E[X|Y]) = h(Y) + E log2 f'(Y)` with `f'(y) = Var[X|y]/s^2`. For a Gaussian source this is equation 5.12,
-/// `D(R) = sx^2 - sx^4/(sx^2 + s^2) (1 - 2^(-2R))`.
-///
-/// # Errors
-/// If `noise_deviation` is not positive and finite.
-pub fn remote_distortion(source: &Source, noise_deviation: f64) -> Result<RemoteDistortion, Error> {
-    let measurement = ConditionalMean::with_deviation(*source, noise_deviation)?;
-    if let Kind::Gaussian { deviation } = source.kind() {
-        let gain = deviation * deviation / (deviation * deviation + noise_deviation * noise_deviation);
-        return Ok(RemoteDistortion {
-            estimation_error: gain * noise_deviation * noise_deviation,
-            entropy_power: gain * deviation * deviation,
-        });
-    }
-    let reach = measurement.measurement_reach();
-    let log2_variance_scale = 2.0 * noise_deviation.log2();
-    let entropy = measurement.integrate(-reach, reach, |y, _, variance| {
-        variance.log2() - log2_variance_scale - measurement.measurement_density(y).log2()
-    });
-    Ok(RemoteDistortion {
-        estimation_error: measurement.estimation_error(),
-        entropy_power: (2.0 * entropy).exp2() / (2.0 * PI * E),
-    })
-}
-
-/// The bound for `sensors` measurements of equal noise and one bit each: noise `s^2/N` and rate `N`.
-///
-/// The thesis uses `s^2` with `N` bits (erratum `binary-6`). Schemes with several sensors have smaller errors: three sign bits of a
-/// Gaussian source at -5 dB have 0.0649 where it gives 0.0764 as bound; the value here is 0.0521.
-///
-/// # Errors
-/// If `noise_deviation` is not positive and finite or there is no sensor.
-pub fn network_rate_distortion(source: &Source, noise_deviation: f64, sensors: usize) -> Result<f64, Error> {
-    let sensors = at_least_one("sensors", sensors)? as f64;
-    remote_distortion(source, positive("noise_deviation", noise_deviation)? / sensors.sqrt())?.at(sensors)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -191,14 +132,5 @@ mod tests {
             let explained = y.integrate(-reach, reach, |_, mean, _| mean * mean);
             assert_relative_eq!(explained + y.estimation_error(), source.variance(), max_relative = tolerance);
         }
-    }
-
-    #[test]
-    fn bad_rates_are_refused() {
-        let bound = remote_distortion(&Source::uniform(1.0).unwrap(), 0.3).unwrap();
-        assert!(bound.at(-1.0).is_err());
-        assert!(bound.at(f64::NAN).is_err());
-        assert!(network_rate_distortion(&Source::uniform(1.0).unwrap(), 0.3, 0).is_err());
-        assert!(remote_distortion(&Source::uniform(1.0).unwrap(), 0.0).is_err());
     }
 }
