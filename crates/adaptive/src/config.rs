@@ -10,18 +10,43 @@ use serde::{Deserialize, Serialize};
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct Config(pub(crate) node::Config);
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "Config")]
-    Stored of Config, ArgumentError, as config;
-    {
-        delta: f64 = config.delta(),
-        #[serde(default)]
-        period: Option<f64> = config.period(),
-        sequence_bits: u32 = config.sequence_bits(),
-        refresh_every: Option<u64> = config.refresh_every(),
-        #[serde(default)]
-        exact: bool = config.resolution().is_some()
-    } => {
+/// The stored form of [`Config`].
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "Config", deny_unknown_fields)]
+struct Stored {
+    delta: f64,
+    #[serde(default)]
+    period: Option<f64>,
+    sequence_bits: u32,
+    refresh_every: Option<u64>,
+    #[serde(default)]
+    exact: bool,
+}
+
+impl From<Config> for Stored {
+    fn from(config: Config) -> Self {
+        Self {
+            delta: config.delta(),
+            period: config.period(),
+            sequence_bits: config.sequence_bits(),
+            refresh_every: config.refresh_every(),
+            exact: config.resolution().is_some(),
+        }
+    }
+}
+
+impl TryFrom<Stored> for Config {
+    type Error = ArgumentError;
+
+    fn try_from(
+        Stored {
+            delta,
+            period,
+            sequence_bits,
+            refresh_every,
+            exact,
+        }: Stored,
+    ) -> Result<Self, ArgumentError> {
         let mut config = Config::new(delta)?;
         if exact {
             config = config.made_exact();

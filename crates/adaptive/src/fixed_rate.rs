@@ -77,16 +77,49 @@ impl Message for Word {
     }
 }
 
-fewbits_numerics::stored_form! {
-    StoredFixedRate of FixedRate, Error, as rate;
-    { bits: u32, unit: f64, belief: ImmBelief<2>, turn: usize } => {
+/// The stored form of [`FixedRate`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredFixedRate {
+    bits: u32,
+    unit: f64,
+    belief: ImmBelief<2>,
+    turn: usize,
+}
+
+impl From<FixedRate> for StoredFixedRate {
+    fn from(rate: FixedRate) -> Self {
+        Self {
+            bits: rate.bits,
+            unit: rate.unit,
+            belief: rate.belief,
+            turn: rate.turn,
+        }
+    }
+}
+
+impl TryFrom<StoredFixedRate> for FixedRate {
+    type Error = Error;
+
+    fn try_from(
+        StoredFixedRate {
+            bits,
+            unit,
+            belief,
+            turn,
+        }: StoredFixedRate,
+    ) -> Result<Self, Error> {
         let rate = FixedRate::new(bits, unit, 0.0)?;
         let models = rate.belief.modes().len();
         if belief.modes().len() != models {
             let expected = format!("{models}, one for each model");
             return Err(ArgumentError::new("belief", format!("{} Gaussians", belief.modes().len()), expected).into());
         }
-        Ok(FixedRate { belief, turn: turn % TURNS, ..rate })
+        Ok(FixedRate {
+            belief,
+            turn: turn % TURNS,
+            ..rate
+        })
     }
 }
 

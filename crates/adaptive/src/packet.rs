@@ -10,10 +10,27 @@ use serde::{Deserialize, Serialize};
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct Packet(pub(crate) fewbits_node::Packet);
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "Packet")]
-    Stored of Packet, ArgumentError, as packet;
-    { word: u128 = packet.0.word(), bits: u32 = packet.0.bits() } => {
+/// The stored form of [`Packet`].
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "Packet", deny_unknown_fields)]
+struct Stored {
+    word: u128,
+    bits: u32,
+}
+
+impl From<Packet> for Stored {
+    fn from(packet: Packet) -> Self {
+        Self {
+            word: packet.0.word(),
+            bits: packet.0.bits(),
+        }
+    }
+}
+
+impl TryFrom<Stored> for Packet {
+    type Error = ArgumentError;
+
+    fn try_from(Stored { word, bits }: Stored) -> Result<Self, ArgumentError> {
         let packet = fewbits_node::Packet::from_word(word, bits).map(Packet);
         packet.ok_or_else(|| ArgumentError::new("bits", bits, "at most 128, as many as the word has"))
     }

@@ -37,16 +37,52 @@ pub struct Receiver {
     synchronised: bool,
 }
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "Receiver")]
-    Stored of Receiver, ArgumentError, as receiver;
-    { config: Config, replica: Option<Replica>, slot: Option<u64>, sequence: u32, synchronised: bool } => {
+/// The stored form of [`Receiver`].
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "Receiver", deny_unknown_fields)]
+struct Stored {
+    config: Config,
+    replica: Option<Replica>,
+    slot: Option<u64>,
+    sequence: u32,
+    synchronised: bool,
+}
+
+impl From<Receiver> for Stored {
+    fn from(receiver: Receiver) -> Self {
+        Self {
+            config: receiver.config,
+            replica: receiver.replica,
+            slot: receiver.slot,
+            sequence: receiver.sequence,
+            synchronised: receiver.synchronised,
+        }
+    }
+}
+
+impl TryFrom<Stored> for Receiver {
+    type Error = ArgumentError;
+
+    fn try_from(stored: Stored) -> Result<Self, ArgumentError> {
+        let Stored {
+            config,
+            replica,
+            slot,
+            sequence,
+            synchronised,
+        } = stored;
         if replica.as_ref().is_some_and(|replica| !replica.is_valid(&config.0)) {
             return Err(ArgumentError::new("replica", "inconsistent", "the state that was stored"));
         }
         let synchronised = synchronised && replica.is_some();
         let sequence = sequence & ((1 << config.sequence_bits()) - 1);
-        Ok(Receiver { config, replica, slot, sequence, synchronised })
+        Ok(Receiver {
+            config,
+            replica,
+            slot,
+            sequence,
+            synchronised,
+        })
     }
 }
 

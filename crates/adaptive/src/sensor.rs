@@ -41,16 +41,40 @@ pub struct Sensor {
     encoder: Encoder,
 }
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "Sensor")]
-    Stored of Sensor, ArgumentError, as sensor;
-    {
-        config: Config,
-        replica: Option<Replica> = sensor.encoder.replica().cloned(),
-        slot: u64 = sensor.encoder.slot(),
-        sequence: u32 = sensor.encoder.sequence(),
-        refresh_requested: bool = sensor.encoder.refresh_requested()
-    } => {
+/// The stored form of [`Sensor`].
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "Sensor", deny_unknown_fields)]
+struct Stored {
+    config: Config,
+    replica: Option<Replica>,
+    slot: u64,
+    sequence: u32,
+    refresh_requested: bool,
+}
+
+impl From<Sensor> for Stored {
+    fn from(sensor: Sensor) -> Self {
+        Self {
+            config: sensor.config,
+            replica: sensor.encoder.replica().cloned(),
+            slot: sensor.encoder.slot(),
+            sequence: sensor.encoder.sequence(),
+            refresh_requested: sensor.encoder.refresh_requested(),
+        }
+    }
+}
+
+impl TryFrom<Stored> for Sensor {
+    type Error = ArgumentError;
+
+    fn try_from(stored: Stored) -> Result<Self, ArgumentError> {
+        let Stored {
+            config,
+            replica,
+            slot,
+            sequence,
+            refresh_requested,
+        } = stored;
         let encoder = Encoder::restored(config.0, replica, slot, sequence, refresh_requested)?;
         Ok(Sensor { config, encoder })
     }

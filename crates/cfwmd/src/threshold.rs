@@ -14,8 +14,20 @@ pub struct Budget {
     sensors: usize,
 }
 
-fewbits_numerics::stored_form! {
-    Numbers of Budget, Error; { messages: f64, sensors: usize } => Budget::new(messages, sensors)
+/// The stored form of [`Budget`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    messages: f64,
+    sensors: usize,
+}
+
+impl TryFrom<Numbers> for Budget {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        Budget::new(parts.messages, parts.sensors)
+    }
 }
 
 impl Budget {

@@ -68,13 +68,29 @@ impl Cell {
     }
 }
 
-// An infinite end is the text `inf` or `-inf` in JSON; where it was left out it is read too.
-fewbits_numerics::stored_form! {
-    Ends of Cell, ArgumentError, as cell;
-    {
-        #[serde(default, with = "fewbits_numerics::stored")]
-        lower: Option<f64> = Some(cell.lower),
-        #[serde(default, with = "fewbits_numerics::stored")]
-        upper: Option<f64> = Some(cell.upper)
-    } => Cell::new(lower.unwrap_or(f64::NEG_INFINITY), upper.unwrap_or(f64::INFINITY))
+/// The stored form. An infinite end is the text `inf` or `-inf` in JSON; where it was left out it is read too.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Ends {
+    #[serde(default, with = "fewbits_numerics::stored")]
+    lower: Option<f64>,
+    #[serde(default, with = "fewbits_numerics::stored")]
+    upper: Option<f64>,
+}
+
+impl From<Cell> for Ends {
+    fn from(cell: Cell) -> Self {
+        Self {
+            lower: Some(cell.lower),
+            upper: Some(cell.upper),
+        }
+    }
+}
+
+impl TryFrom<Ends> for Cell {
+    type Error = ArgumentError;
+
+    fn try_from(ends: Ends) -> Result<Self, ArgumentError> {
+        Self::new(ends.lower.unwrap_or(f64::NEG_INFINITY), ends.upper.unwrap_or(f64::INFINITY))
+    }
 }

@@ -170,15 +170,23 @@ impl Gaussian<1> {
     }
 }
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "Gaussian")]
-    Moments<const D> of Gaussian<D>, ArgumentError;
-    {
-        #[serde(with = "fewbits_numerics::stored")]
-        mean: SVector<f64, D>,
-        #[serde(with = "fewbits_numerics::stored")]
-        covariance: SMatrix<f64, D, D>
-    } => Gaussian::new(mean, covariance)
+/// The stored form of [`Gaussian`].
+#[derive(Deserialize)]
+#[serde(rename = "Gaussian")]
+#[serde(deny_unknown_fields)]
+struct Moments<const D: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
+    mean: SVector<f64, D>,
+    #[serde(with = "fewbits_numerics::stored")]
+    covariance: SMatrix<f64, D, D>,
+}
+
+impl<const D: usize> TryFrom<Moments<D>> for Gaussian<D> {
+    type Error = ArgumentError;
+
+    fn try_from(parts: Moments<D>) -> Result<Self, ArgumentError> {
+        Gaussian::new(parts.mean, parts.covariance)
+    }
 }
 
 impl<const D: usize> Belief<D> for Gaussian<D> {

@@ -57,8 +57,20 @@ pub struct RangeNoise {
     relative: f64,
 }
 
-fewbits_numerics::stored_form! {
-    Stored of RangeNoise, Error; { constant: f64, relative: f64 } => RangeNoise::new(constant, relative)
+/// The stored form of [`RangeNoise`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    constant: f64,
+    relative: f64,
+}
+
+impl TryFrom<Stored> for RangeNoise {
+    type Error = Error;
+
+    fn try_from(parts: Stored) -> Result<Self, Error> {
+        RangeNoise::new(parts.constant, parts.relative)
+    }
 }
 
 impl RangeNoise {

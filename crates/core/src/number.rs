@@ -32,8 +32,21 @@ pub struct Levels {
     bits: u32,
 }
 
-fewbits_numerics::stored_form! {
-    Numbers of Levels, ArgumentError; { lower: f64, upper: f64, bits: u32 } => Levels::new(lower, upper, bits)
+/// The stored form of [`Levels`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    lower: f64,
+    upper: f64,
+    bits: u32,
+}
+
+impl TryFrom<Numbers> for Levels {
+    type Error = ArgumentError;
+
+    fn try_from(parts: Numbers) -> Result<Self, ArgumentError> {
+        Levels::new(parts.lower, parts.upper, parts.bits)
+    }
 }
 
 impl Levels {

@@ -68,14 +68,22 @@ pub struct Link {
     crossover: f64,
 }
 
-fewbits_numerics::stored_form! {
-    Numbers of Link, ArgumentError;
-    {
-        loss: f64,
-        #[serde(default)]
-        erasure: f64,
-        crossover: f64
-    } => Link::new(loss, crossover)?.with_erasure(erasure)
+/// The stored form of [`Link`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    loss: f64,
+    #[serde(default)]
+    erasure: f64,
+    crossover: f64,
+}
+
+impl TryFrom<Numbers> for Link {
+    type Error = ArgumentError;
+
+    fn try_from(parts: Numbers) -> Result<Self, ArgumentError> {
+        Link::new(parts.loss, parts.crossover)?.with_erasure(parts.erasure)
+    }
 }
 
 impl Link {

@@ -52,9 +52,21 @@ pub struct RoundedSample {
     bits: u32,
 }
 
-fewbits_numerics::stored_form! {
-    Numbers of RoundedSample, Error;
-    { noise_variance: f64, resolution: f64, bits: u32 } => RoundedSample::new(noise_variance, resolution)?.with_bits(bits)
+/// The stored form of [`RoundedSample`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    noise_variance: f64,
+    resolution: f64,
+    bits: u32,
+}
+
+impl TryFrom<Numbers> for RoundedSample {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        RoundedSample::new(parts.noise_variance, parts.resolution)?.with_bits(parts.bits)
+    }
 }
 
 /// Largest word length whose cells are enumerated. A link that inverts bits needs the likelihood of every cell.

@@ -77,8 +77,20 @@ pub struct InnovationWord {
     quantizer: &'static LloydMax,
 }
 
-fewbits_numerics::stored_form! {
-    Numbers of InnovationWord, Error; { noise_variance: f64, bits: u32 } => InnovationWord::new(noise_variance, bits as usize)
+/// The stored form of [`InnovationWord`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    noise_variance: f64,
+    bits: u32,
+}
+
+impl TryFrom<Numbers> for InnovationWord {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        InnovationWord::new(parts.noise_variance, parts.bits as usize)
+    }
 }
 
 impl InnovationWord {

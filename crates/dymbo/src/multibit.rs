@@ -30,9 +30,31 @@ pub struct MultibitFilter {
     information: f64,
 }
 
-fewbits_numerics::stored_form! {
-    Numbers of MultibitFilter, Error, as filter;
-    { plant: ScalarPlant, bits: u32 = filter.scheme.bits(), link: Link } => Ok(MultibitFilter::new(plant, bits as usize)?.with_link(link))
+/// The stored form of [`MultibitFilter`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    plant: ScalarPlant,
+    bits: u32,
+    link: Link,
+}
+
+impl From<MultibitFilter> for Numbers {
+    fn from(filter: MultibitFilter) -> Self {
+        Self {
+            plant: filter.plant,
+            bits: filter.scheme.bits(),
+            link: filter.link,
+        }
+    }
+}
+
+impl TryFrom<Numbers> for MultibitFilter {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        Ok(MultibitFilter::new(parts.plant, parts.bits as usize)?.with_link(parts.link))
+    }
 }
 
 impl MultibitFilter {

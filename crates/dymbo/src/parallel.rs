@@ -47,9 +47,22 @@ pub struct ParallelFilter {
     link: Link,
 }
 
-fewbits_numerics::stored_form! {
-    Numbers of ParallelFilter, Error;
-    { plant: ScalarPlant, sensors: usize, fusion: CountFusion, link: Link } => Ok(ParallelFilter::new(plant, sensors, fusion)?.with_link(link))
+/// The stored form of [`ParallelFilter`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    plant: ScalarPlant,
+    sensors: usize,
+    fusion: CountFusion,
+    link: Link,
+}
+
+impl TryFrom<Numbers> for ParallelFilter {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        Ok(ParallelFilter::new(parts.plant, parts.sensors, parts.fusion)?.with_link(parts.link))
+    }
 }
 
 impl ParallelFilter {

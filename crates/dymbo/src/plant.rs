@@ -22,13 +22,31 @@ pub struct ScalarPlant {
     sensor: LinearSensor<1, 1>,
 }
 
-fewbits_numerics::stored_form! {
-    Numbers of ScalarPlant, Error, as plant;
-    {
-        coefficient: f64 = plant.coefficient(),
-        process_variance: f64 = plant.process_variance(),
-        measurement_variance: f64 = plant.measurement_variance()
-    } => ScalarPlant::new(coefficient, process_variance, measurement_variance)
+/// The stored form of [`ScalarPlant`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    coefficient: f64,
+    process_variance: f64,
+    measurement_variance: f64,
+}
+
+impl From<ScalarPlant> for Numbers {
+    fn from(plant: ScalarPlant) -> Self {
+        Self {
+            coefficient: plant.coefficient(),
+            process_variance: plant.process_variance(),
+            measurement_variance: plant.measurement_variance(),
+        }
+    }
+}
+
+impl TryFrom<Numbers> for ScalarPlant {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        ScalarPlant::new(parts.coefficient, parts.process_variance, parts.measurement_variance)
+    }
 }
 
 impl ScalarPlant {

@@ -31,8 +31,19 @@ pub struct SignBit {
     noise_variance: f64,
 }
 
-fewbits_numerics::stored_form! {
-    Numbers of SignBit, Error; { noise_variance: f64 } => SignBit::new(noise_variance)
+/// The stored form of [`SignBit`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    noise_variance: f64,
+}
+
+impl TryFrom<Numbers> for SignBit {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        SignBit::new(parts.noise_variance)
+    }
 }
 
 impl SignBit {

@@ -43,10 +43,18 @@ pub struct GuidedParticles<const D: usize> {
     moves: Vec<Gaussian<D>>,
 }
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "GuidedParticles")]
-    Stored<const D> of GuidedParticles<D>, ArgumentError;
-    { particles: Particles<D>, moves: Vec<Gaussian<D>> } => {
+/// The stored form of [`GuidedParticles`].
+#[derive(Deserialize)]
+#[serde(rename = "GuidedParticles", deny_unknown_fields)]
+struct Stored<const D: usize> {
+    particles: Particles<D>,
+    moves: Vec<Gaussian<D>>,
+}
+
+impl<const D: usize> TryFrom<Stored<D>> for GuidedParticles<D> {
+    type Error = ArgumentError;
+
+    fn try_from(Stored { particles, moves }: Stored<D>) -> Result<Self, ArgumentError> {
         if moves.is_empty() || moves.len() == particles.len() {
             return Ok(Self { particles, moves });
         }

@@ -17,9 +17,21 @@ pub struct ImmBelief<const D: usize> {
     pub(crate) modes: Vec<Gaussian<D>>,
 }
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "ImmBelief")]
-    Stored<const D> of ImmBelief<D>, ArgumentError; { probabilities: Vec<f64>, modes: Vec<Gaussian<D>> } => ImmBelief::new(probabilities, modes)
+/// The stored form of [`ImmBelief`].
+#[derive(Deserialize)]
+#[serde(rename = "ImmBelief")]
+#[serde(deny_unknown_fields)]
+struct Stored<const D: usize> {
+    probabilities: Vec<f64>,
+    modes: Vec<Gaussian<D>>,
+}
+
+impl<const D: usize> TryFrom<Stored<D>> for ImmBelief<D> {
+    type Error = ArgumentError;
+
+    fn try_from(parts: Stored<D>) -> Result<Self, ArgumentError> {
+        ImmBelief::new(parts.probabilities, parts.modes)
+    }
 }
 
 impl<const D: usize> ImmBelief<D> {

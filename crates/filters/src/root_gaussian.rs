@@ -21,15 +21,23 @@ pub struct RootGaussian<const D: usize> {
     lower: SMatrix<f64, D, D>,
 }
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "RootGaussian")]
-    Parts<const D> of RootGaussian<D>, Error;
-    {
-        #[serde(with = "fewbits_numerics::stored")]
-        mean: SVector<f64, D>,
-        #[serde(with = "fewbits_numerics::stored")]
-        lower: SMatrix<f64, D, D>
-    } => Self::new(mean, lower)
+/// The stored form.
+#[derive(Deserialize)]
+#[serde(rename = "RootGaussian")]
+#[serde(deny_unknown_fields)]
+struct Parts<const D: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
+    mean: SVector<f64, D>,
+    #[serde(with = "fewbits_numerics::stored")]
+    lower: SMatrix<f64, D, D>,
+}
+
+impl<const D: usize> TryFrom<Parts<D>> for RootGaussian<D> {
+    type Error = Error;
+
+    fn try_from(parts: Parts<D>) -> Result<Self, Error> {
+        Self::new(parts.mean, parts.lower)
+    }
 }
 
 impl<const D: usize> RootGaussian<D> {

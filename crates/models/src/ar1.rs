@@ -17,9 +17,29 @@ pub struct Ar1 {
     noise_covariance: Matrix1<f64>,
 }
 
-fewbits_numerics::stored_form! {
-    Parameters of Ar1, Error, as model;
-    { coefficient: f64 = model.coefficient(), noise_variance: f64 = model.noise_variance() } => Ar1::new_unstable(coefficient, noise_variance)
+/// The stored form of [`Ar1`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parameters {
+    coefficient: f64,
+    noise_variance: f64,
+}
+
+impl From<Ar1> for Parameters {
+    fn from(model: Ar1) -> Self {
+        Self {
+            coefficient: model.coefficient(),
+            noise_variance: model.noise_variance(),
+        }
+    }
+}
+
+impl TryFrom<Parameters> for Ar1 {
+    type Error = Error;
+
+    fn try_from(parts: Parameters) -> Result<Self, Error> {
+        Ar1::new_unstable(parts.coefficient, parts.noise_variance)
+    }
 }
 
 impl Ar1 {

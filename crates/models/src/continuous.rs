@@ -32,17 +32,25 @@ pub struct ContinuousLinear<const D: usize> {
     density: SMatrix<f64, D, D>,
 }
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "ContinuousLinear")]
-    Parameters<const D> of ContinuousLinear<D>, Error;
-    {
-        #[serde(with = "fewbits_numerics::stored")]
-        drift: SMatrix<f64, D, D>,
-        #[serde(with = "fewbits_numerics::stored")]
-        offset: SVector<f64, D>,
-        #[serde(with = "fewbits_numerics::stored")]
-        density: SMatrix<f64, D, D>
-    } => ContinuousLinear::new(drift, offset, density)
+/// The stored form of [`ContinuousLinear`].
+#[derive(Deserialize)]
+#[serde(rename = "ContinuousLinear")]
+#[serde(deny_unknown_fields)]
+struct Parameters<const D: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
+    drift: SMatrix<f64, D, D>,
+    #[serde(with = "fewbits_numerics::stored")]
+    offset: SVector<f64, D>,
+    #[serde(with = "fewbits_numerics::stored")]
+    density: SMatrix<f64, D, D>,
+}
+
+impl<const D: usize> TryFrom<Parameters<D>> for ContinuousLinear<D> {
+    type Error = Error;
+
+    fn try_from(parts: Parameters<D>) -> Result<Self, Error> {
+        ContinuousLinear::new(parts.drift, parts.offset, parts.density)
+    }
 }
 
 impl<const D: usize> ContinuousLinear<D> {

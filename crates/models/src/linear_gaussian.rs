@@ -30,17 +30,25 @@ pub struct LinearGaussian<const D: usize, const U: usize> {
     noise_covariance: SMatrix<f64, D, D>,
 }
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "LinearGaussian")]
-    Parameters<const D, const U> of LinearGaussian<D, U>, Error;
-    {
-        #[serde(with = "fewbits_numerics::stored")]
-        transition: SMatrix<f64, D, D>,
-        #[serde(with = "fewbits_numerics::stored")]
-        gain: SMatrix<f64, D, U>,
-        #[serde(with = "fewbits_numerics::stored")]
-        noise_variances: SVector<f64, U>
-    } => LinearGaussian::new(transition, gain, noise_variances)
+/// The stored form of [`LinearGaussian`].
+#[derive(Deserialize)]
+#[serde(rename = "LinearGaussian")]
+#[serde(deny_unknown_fields)]
+struct Parameters<const D: usize, const U: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
+    transition: SMatrix<f64, D, D>,
+    #[serde(with = "fewbits_numerics::stored")]
+    gain: SMatrix<f64, D, U>,
+    #[serde(with = "fewbits_numerics::stored")]
+    noise_variances: SVector<f64, U>,
+}
+
+impl<const D: usize, const U: usize> TryFrom<Parameters<D, U>> for LinearGaussian<D, U> {
+    type Error = Error;
+
+    fn try_from(parts: Parameters<D, U>) -> Result<Self, Error> {
+        LinearGaussian::new(parts.transition, parts.gain, parts.noise_variances)
+    }
 }
 
 impl<const D: usize, const U: usize> LinearGaussian<D, U> {

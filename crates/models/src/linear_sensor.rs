@@ -23,15 +23,23 @@ pub struct LinearSensor<const D: usize, const M: usize> {
     noise_factor: SMatrix<f64, M, M>,
 }
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "LinearSensor")]
-    Parameters<const D, const M> of LinearSensor<D, M>, Error;
-    {
-        #[serde(with = "fewbits_numerics::stored")]
-        matrix: SMatrix<f64, M, D>,
-        #[serde(with = "fewbits_numerics::stored")]
-        noise_covariance: SMatrix<f64, M, M>
-    } => LinearSensor::new(matrix, noise_covariance)
+/// The stored form of [`LinearSensor`].
+#[derive(Deserialize)]
+#[serde(rename = "LinearSensor")]
+#[serde(deny_unknown_fields)]
+struct Parameters<const D: usize, const M: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
+    matrix: SMatrix<f64, M, D>,
+    #[serde(with = "fewbits_numerics::stored")]
+    noise_covariance: SMatrix<f64, M, M>,
+}
+
+impl<const D: usize, const M: usize> TryFrom<Parameters<D, M>> for LinearSensor<D, M> {
+    type Error = Error;
+
+    fn try_from(parts: Parameters<D, M>) -> Result<Self, Error> {
+        LinearSensor::new(parts.matrix, parts.noise_covariance)
+    }
 }
 
 /// One scalar measurement: `z = h'x + w`, `w ~ N(0, r)`.

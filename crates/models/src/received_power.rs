@@ -23,13 +23,46 @@ pub struct ReceivedPower<const D: usize> {
     noise_covariance: Matrix1<f64>,
 }
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "ReceivedPower")]
-    Parameters<const D> of ReceivedPower<D>, Error, as sensor;
-    {
-        #[serde(with = "fewbits_numerics::stored")]
-        position: Vector2<f64>, axes: [usize; 2], power: f64, attenuation: f64, exponent: f64, noise_variance: f64 = sensor.noise_variance()
-    } => ReceivedPower::new(position, axes, power, attenuation, exponent, noise_variance)
+/// The stored form of [`ReceivedPower`].
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "ReceivedPower")]
+#[serde(deny_unknown_fields)]
+struct Parameters<const D: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
+    position: Vector2<f64>,
+    axes: [usize; 2],
+    power: f64,
+    attenuation: f64,
+    exponent: f64,
+    noise_variance: f64,
+}
+
+impl<const D: usize> From<ReceivedPower<D>> for Parameters<D> {
+    fn from(sensor: ReceivedPower<D>) -> Self {
+        Self {
+            position: sensor.position,
+            axes: sensor.axes,
+            power: sensor.power,
+            attenuation: sensor.attenuation,
+            exponent: sensor.exponent,
+            noise_variance: sensor.noise_variance(),
+        }
+    }
+}
+
+impl<const D: usize> TryFrom<Parameters<D>> for ReceivedPower<D> {
+    type Error = Error;
+
+    fn try_from(parts: Parameters<D>) -> Result<Self, Error> {
+        ReceivedPower::new(
+            parts.position,
+            parts.axes,
+            parts.power,
+            parts.attenuation,
+            parts.exponent,
+            parts.noise_variance,
+        )
+    }
 }
 
 impl<const D: usize> ReceivedPower<D> {

@@ -90,10 +90,25 @@ pub struct Tracker<const D: usize> {
     least: f64,
 }
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "Tracker")]
-    Parts<const D> of Tracker<D>, Error;
-    { survival: f64, births: Vec<Birth<D>>, gate: f64, least: f64 } => Self::new(survival, births)?.with_gate(gate)?.with_least(least)
+/// The stored form.
+#[derive(Deserialize)]
+#[serde(rename = "Tracker")]
+#[serde(deny_unknown_fields)]
+struct Parts<const D: usize> {
+    survival: f64,
+    births: Vec<Birth<D>>,
+    gate: f64,
+    least: f64,
+}
+
+impl<const D: usize> TryFrom<Parts<D>> for Tracker<D> {
+    type Error = Error;
+
+    fn try_from(parts: Parts<D>) -> Result<Self, Error> {
+        Self::new(parts.survival, parts.births)?
+            .with_gate(parts.gate)?
+            .with_least(parts.least)
+    }
 }
 
 impl<const D: usize> Tracker<D> {

@@ -164,60 +164,6 @@ pub fn deserialize<'de, T: Floats, D: Deserializer<'de>>(deserializer: D) -> Res
     T::read(T::Form::deserialize(deserializer)?).ok_or_else(|| D::Error::custom("an array of another length"))
 }
 
-/// The stored form of a type whose numbers are checked: a private struct that denies unknown fields, and the conversion of what was
-/// read, by an expression of the fields. The type itself has `#[serde(try_from = "Form")]`. With `as value`, it has `into = "Form"`
-/// too, and each field is the value's own or what stands behind its `=`.
-///
-/// ```
-/// use fewbits_numerics::error::{ArgumentError, positive};
-/// #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-/// #[serde(try_from = "Stored", into = "Stored")]
-/// struct Scale {
-///     root: f64,
-/// }
-/// fewbits_numerics::stored_form! {
-///     Stored of Scale, ArgumentError, as scale; { variance: f64 = scale.root.powi(2) } => Ok(Self { root: positive("variance", variance)?.sqrt() })
-/// }
-/// assert_eq!(serde_json::to_string(&Scale { root: 2.0 }).unwrap(), r#"{"variance":4.0}"#);
-/// assert!(serde_json::from_str::<Scale>(r#"{"variance":0.0}"#).is_err());
-/// ```
-#[macro_export]
-macro_rules! stored_form {
-    ($(#[$meta:meta])* $form:ident$(<$(const $n:ident),+>)? of $type:ty, $error:ty, as $value:ident;
-     { $($(#[$attribute:meta])* $field:ident: $held:ty $(= $stored:expr)?),* } => $make:expr) => {
-        $crate::stored_form! {
-            $(#[$meta])* #[derive(::serde::Serialize)]
-            $form$(<$(const $n),+>)? of $type, $error; { $($(#[$attribute])* $field: $held),* } => $make
-        }
-
-        impl$(<$(const $n: usize),+>)? From<$type> for $form$(<$($n),+>)? {
-            fn from($value: $type) -> Self {
-                Self { $($field: $crate::stored_form!(@ $value $field $($stored)?)),* }
-            }
-        }
-    };
-    ($(#[$meta:meta])* $form:ident$(<$(const $n:ident),+>)? of $type:ty, $error:ty;
-     { $($(#[$attribute:meta])* $field:ident: $held:ty),* } => $make:expr) => {
-        #[derive(::serde::Deserialize)]
-        #[serde(deny_unknown_fields)]
-        $(#[$meta])*
-        struct $form$(<$(const $n: usize),+>)? {
-            $($(#[$attribute])* $field: $held),*
-        }
-
-        impl$(<$(const $n: usize),+>)? TryFrom<$form$(<$($n),+>)?> for $type {
-            type Error = $error;
-
-            fn try_from(stored: $form$(<$($n),+>)?) -> Result<Self, $error> {
-                let $form { $($field),* } = stored;
-                $make
-            }
-        }
-    };
-    (@ $value:ident $field:ident) => { $value.$field };
-    (@ $value:ident $field:ident $stored:expr) => { $stored };
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]

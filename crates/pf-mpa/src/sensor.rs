@@ -19,9 +19,21 @@ pub struct RangeSensor {
     noise: RangeNoise,
 }
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "RangeSensor")]
-    Place of RangeSensor, Error; { position: Vector2<f64>, noise: RangeNoise } => RangeSensor::new(position, noise)
+/// The stored form of [`RangeSensor`].
+#[derive(Deserialize)]
+#[serde(rename = "RangeSensor")]
+#[serde(deny_unknown_fields)]
+struct Place {
+    position: Vector2<f64>,
+    noise: RangeNoise,
+}
+
+impl TryFrom<Place> for RangeSensor {
+    type Error = Error;
+
+    fn try_from(parts: Place) -> Result<Self, Error> {
+        RangeSensor::new(parts.position, parts.noise)
+    }
 }
 
 impl RangeSensor {

@@ -21,8 +21,19 @@ pub struct StochasticTrigger {
     precision: f64,
 }
 
-fewbits_numerics::stored_form! {
-    Numbers of StochasticTrigger, Error; { precision: f64 } => StochasticTrigger::new(precision)
+/// The stored form of [`StochasticTrigger`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    precision: f64,
+}
+
+impl TryFrom<Numbers> for StochasticTrigger {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        StochasticTrigger::new(parts.precision)
+    }
 }
 
 impl StochasticTrigger {

@@ -14,9 +14,21 @@ pub struct AccelerationChain {
     transition: [[f64; 3]; 3],
 }
 
-fewbits_numerics::stored_form! {
-    StoredChain of AccelerationChain, Error;
-    { magnitude: f64, initial: [f64; 3], transition: [[f64; 3]; 3] } => AccelerationChain::new(magnitude, initial, transition)
+/// The stored form of [`AccelerationChain`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredChain {
+    magnitude: f64,
+    initial: [f64; 3],
+    transition: [[f64; 3]; 3],
+}
+
+impl TryFrom<StoredChain> for AccelerationChain {
+    type Error = Error;
+
+    fn try_from(parts: StoredChain) -> Result<Self, Error> {
+        AccelerationChain::new(parts.magnitude, parts.initial, parts.transition)
+    }
 }
 
 impl AccelerationChain {

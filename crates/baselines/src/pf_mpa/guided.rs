@@ -32,8 +32,19 @@ pub struct GuidedGaussian {
     draws: usize,
 }
 
-fewbits_numerics::stored_form! {
-    Stored of GuidedGaussian, Error; { draws: usize } => GuidedGaussian::new(draws)
+/// The stored form of [`GuidedGaussian`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    draws: usize,
+}
+
+impl TryFrom<Stored> for GuidedGaussian {
+    type Error = Error;
+
+    fn try_from(parts: Stored) -> Result<Self, Error> {
+        GuidedGaussian::new(parts.draws)
+    }
 }
 
 /// Buffers that are reused from step to step.

@@ -31,8 +31,19 @@ pub struct RaoBlackwellGuided {
     particles: usize,
 }
 
-fewbits_numerics::stored_form! {
-    Stored of RaoBlackwellGuided, Error; { particles: usize } => RaoBlackwellGuided::new(particles)
+/// The stored form of [`RaoBlackwellGuided`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    particles: usize,
+}
+
+impl TryFrom<Stored> for RaoBlackwellGuided {
+    type Error = Error;
+
+    fn try_from(parts: Stored) -> Result<Self, Error> {
+        RaoBlackwellGuided::new(parts.particles)
+    }
 }
 
 impl RaoBlackwellGuided {

@@ -22,9 +22,21 @@ pub struct Target {
     chain: AccelerationChain,
 }
 
-fewbits_numerics::stored_form! {
-    StoredTarget of Target, Error;
-    { interval: f64, noise_variance: f64, chain: AccelerationChain } => Target::new(interval, noise_variance, chain)
+/// The stored form of [`Target`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredTarget {
+    interval: f64,
+    noise_variance: f64,
+    chain: AccelerationChain,
+}
+
+impl TryFrom<StoredTarget> for Target {
+    type Error = Error;
+
+    fn try_from(parts: StoredTarget) -> Result<Self, Error> {
+        Target::new(parts.interval, parts.noise_variance, parts.chain)
+    }
 }
 
 impl Target {

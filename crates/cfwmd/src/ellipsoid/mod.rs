@@ -26,14 +26,22 @@ pub struct Ellipsoid<const M: usize> {
     threshold: f64,
 }
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "Ellipsoid")]
-    Numbers<const M> of Ellipsoid<M>, ArgumentError;
-    {
-        #[serde(with = "fewbits_numerics::stored")]
-        innovation_covariance: SMatrix<f64, M, M>,
-        threshold: f64
-    } => Ellipsoid::new(&innovation_covariance, threshold)
+/// The stored form of [`Ellipsoid`].
+#[derive(Deserialize)]
+#[serde(rename = "Ellipsoid")]
+#[serde(deny_unknown_fields)]
+struct Numbers<const M: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
+    innovation_covariance: SMatrix<f64, M, M>,
+    threshold: f64,
+}
+
+impl<const M: usize> TryFrom<Numbers<M>> for Ellipsoid<M> {
+    type Error = ArgumentError;
+
+    fn try_from(parts: Numbers<M>) -> Result<Self, ArgumentError> {
+        Ellipsoid::new(&parts.innovation_covariance, parts.threshold)
+    }
 }
 
 impl<const M: usize> Ellipsoid<M> {

@@ -18,13 +18,13 @@ pub struct Value<const M: usize> {
     log_scale: f64,
 }
 
-fewbits_numerics::stored_form! {
-    Parts<const M> of Value<M>, ArgumentError, as value;
-    {
-        noise: Gaussian<M> = *value.noise.gaussian(),
-        #[serde(default)]
-        log_scale: f64
-    } => Value::new(*noise.mean(), *noise.covariance())?.times_exp(log_scale)
+/// The stored form of [`Value`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parts<const M: usize> {
+    noise: Gaussian<M>,
+    #[serde(default)]
+    log_scale: f64,
 }
 
 impl<const M: usize> Value<M> {
@@ -82,6 +82,23 @@ impl Value<1> {
     pub fn scalar(value: f64, noise_variance: f64) -> Result<Self, ArgumentError> {
         fewbits_numerics::error::positive("noise_variance", noise_variance)?;
         Self::new([value].into(), [[noise_variance]].into())
+    }
+}
+
+impl<const M: usize> From<Value<M>> for Parts<M> {
+    fn from(value: Value<M>) -> Self {
+        Self {
+            noise: *value.noise.gaussian(),
+            log_scale: value.log_scale,
+        }
+    }
+}
+
+impl<const M: usize> TryFrom<Parts<M>> for Value<M> {
+    type Error = ArgumentError;
+
+    fn try_from(parts: Parts<M>) -> Result<Self, ArgumentError> {
+        Self::new(*parts.noise.mean(), *parts.noise.covariance())?.times_exp(parts.log_scale)
     }
 }
 

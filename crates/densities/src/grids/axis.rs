@@ -13,9 +13,22 @@ pub struct UniformGrid {
     points: usize,
 }
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "Grid")]
-    Stored of UniformGrid, Error; { lower: f64, spacing: f64, points: usize } => UniformGrid::from_nodes(lower, spacing, points)
+/// The stored form of [`UniformGrid`].
+#[derive(Deserialize)]
+#[serde(rename = "Grid")]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    lower: f64,
+    spacing: f64,
+    points: usize,
+}
+
+impl TryFrom<Stored> for UniformGrid {
+    type Error = Error;
+
+    fn try_from(Stored { lower, spacing, points }: Stored) -> Result<Self, Error> {
+        UniformGrid::from_nodes(lower, spacing, points)
+    }
 }
 
 /// Largest number of nodes of a grid.

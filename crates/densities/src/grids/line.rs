@@ -18,10 +18,21 @@ pub struct PointMass {
     density: Vec<f64>,
 }
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "PointMass")]
-    Stored of PointMass, Error;
-    { grid: UniformGrid, density: Vec<f64> } => check_density(&density, grid.points(), grid.spacing()).map(|()| PointMass { grid, density })
+/// The stored form of [`PointMass`].
+#[derive(Deserialize)]
+#[serde(rename = "PointMass")]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    grid: UniformGrid,
+    density: Vec<f64>,
+}
+
+impl TryFrom<Stored> for PointMass {
+    type Error = Error;
+
+    fn try_from(Stored { grid, density }: Stored) -> Result<Self, Error> {
+        check_density(&density, grid.points(), grid.spacing()).map(|()| PointMass { grid, density })
+    }
 }
 
 /// Checks densities at `nodes` nodes of the given volume each: finite, non-negative, integrating to one.

@@ -242,11 +242,28 @@ impl<const D: usize> Density<D> for KernelEstimate<D> {
     crate::own_log_pdf!();
 }
 
-fewbits_numerics::stored_form! {
-    Stored<const D> of KernelEstimate<D>, Error, as estimate;
-    {
-        #[serde(with = "fewbits_numerics::stored")]
-        kernel: [[f64; D]; D] = estimate.kernel.into(),
-        particles: Particles<D>
-    } => KernelEstimate::new(particles, kernel.into())
+/// The stored form of [`KernelEstimate`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored<const D: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
+    kernel: [[f64; D]; D],
+    particles: Particles<D>,
+}
+
+impl<const D: usize> From<KernelEstimate<D>> for Stored<D> {
+    fn from(estimate: KernelEstimate<D>) -> Self {
+        Self {
+            kernel: estimate.kernel.into(),
+            particles: estimate.particles,
+        }
+    }
+}
+
+impl<const D: usize> TryFrom<Stored<D>> for KernelEstimate<D> {
+    type Error = Error;
+
+    fn try_from(parts: Stored<D>) -> Result<Self, Error> {
+        KernelEstimate::new(parts.particles, parts.kernel.into())
+    }
 }

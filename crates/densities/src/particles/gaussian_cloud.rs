@@ -21,14 +21,22 @@ pub struct GaussianCloud<const D: usize> {
     pub shared_covariance: SMatrix<f64, D, D>,
 }
 
-fewbits_numerics::stored_form! {
-    #[serde(rename = "GaussianCloud")]
-    Stored<const D> of GaussianCloud<D>, Error;
-    {
-        means: Particles<D>,
-        #[serde(with = "fewbits_numerics::stored")]
-        covariance: SMatrix<f64, D, D>
-    } => GaussianCloud::new(means, covariance)
+/// The stored form of [`GaussianCloud`].
+#[derive(Deserialize)]
+#[serde(rename = "GaussianCloud")]
+#[serde(deny_unknown_fields)]
+struct Stored<const D: usize> {
+    means: Particles<D>,
+    #[serde(with = "fewbits_numerics::stored")]
+    covariance: SMatrix<f64, D, D>,
+}
+
+impl<const D: usize> TryFrom<Stored<D>> for GaussianCloud<D> {
+    type Error = Error;
+
+    fn try_from(parts: Stored<D>) -> Result<Self, Error> {
+        GaussianCloud::new(parts.means, parts.covariance)
+    }
 }
 
 impl<const D: usize> GaussianCloud<D> {
