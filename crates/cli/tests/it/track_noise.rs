@@ -44,3 +44,46 @@ fn stated_noise_stays() {
     assert!(has_hint(&summary, "the stated one is kept"), "{summary}");
     assert_eq!(summary["sensors"][0]["noise"], 1.0);
 }
+
+/// Defect: the level jumped to -999, and to the zeros of all sensors, as both of them agreed.
+#[test]
+fn numbers_that_all_sensors_have_at_once_stand_for_gaps() {
+    for mark in ["-999", "0"] {
+        let (mut numbers, mut level, mut truth, mut table) = (Numbers(73), 120.0, Vec::new(), "a,b\n".to_owned());
+        for row in 0..400 {
+            level += 0.2 * numbers.normal();
+            truth.push(level);
+            let cells = [0.5, 1.0].map(|noise| format!("{:.4}", level + noise * numbers.normal()));
+            let is_gap = row % 100 == 57;
+            table += &(if is_gap {
+                format!("{mark},{mark}\n")
+            } else {
+                cells.join(",") + "\n"
+            });
+        }
+        let (rows, summary) = tracked(&table, &[]);
+        assert!(has_hint(&summary, "these are taken for gaps"), "{summary}");
+        let inside = rows
+            .iter()
+            .zip(&truth)
+            .filter(|(row, truth)| held(row, **truth))
+            .count();
+        assert!(inside > 360 && held(&rows[57], truth[57]), "{mark}: {inside}");
+    }
+}
+
+/// Defect: metres that become centimetres were not told.
+#[test]
+fn another_unit_is_told() {
+    let (mut numbers, mut level, mut table) = (Numbers(74), 20.0, "a\n".to_owned());
+    for row in 0..400 {
+        level += 0.1 * numbers.normal();
+        let factor = if row < 250 { 1.0 } else { 100.0 };
+        table += &format!("{:.4}\n", factor * (level + 0.3 * numbers.normal()));
+    }
+    let (_, summary) = tracked(&table, &[]);
+    assert!(
+        has_hint(&summary, "change at its value 251 by what is between a unit and its hundredth"),
+        "{summary}"
+    );
+}
