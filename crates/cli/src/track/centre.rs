@@ -1,23 +1,24 @@
 //! The fusion centre for sensors that all measure the same level.
 
+use super::estimator::{Estimator, Step, Use};
 use super::instant::{Instant, Qualifier};
+use super::lasting::{ErrorUnderLasting, Lasting};
 use super::meaning::Seat;
+use super::remote::remote;
 use super::sensors;
 use super::world::World;
 use crate::arguments::Model;
 use crate::error::Failure;
 use crate::report::Report;
-use fewbits_core::{BitString, Gaussian, Link, Message, NumberFormat, Observation, OnAxes, SensorNode, circle};
-use fewbits_filters::centre::{
-    Failures, FalseAlarms, FusionCentre, NoiseLearning, ReportTest, Reporting, SensorState, Slot,
-};
+use fewbits_core::{Gaussian, Message, NumberFormat, Observation, SensorNode, circle};
+use fewbits_filters::centre::{CentreState, Failures, FalseAlarms, FusionCentre, NoiseLearning, SensorState, Slot};
 use fewbits_filters::smoother::{Filtered, smooth};
 use fewbits_filters::{MomentFilter, PointMassFilter, StateFilter};
-use fewbits_models::{ContinuousLinear, LinearSensor};
-use fewbits_recipes::stated::{StatedReading, Stating};
+use fewbits_models::ContinuousLinear;
 use nalgebra::Vector1;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
+use std::collections::VecDeque;
 
 /// Probability per row that a sensor fails.
 const FAILURE: f64 = 1e-4;
@@ -27,58 +28,17 @@ const ALARMS: FalseAlarms = FalseAlarms {
     sensor: 1e-6,
     centre: 1e-5,
 };
+/// The same where errors of sensors last, which no test of the centre expects.
+const ALARMS_IF_LASTING: FalseAlarms = FalseAlarms {
+    sensor: 1e-9,
+    centre: 1e-9,
+};
 /// Step of the learnt change for one sensor. The change that is found from the first rows is accurate already, so it is small.
 const LEARNING: f64 = 0.01;
 /// Smallest and largest factor of the change's variance: a level may rest while it is found, and then move.
 const LEARNT: [f64; 2] = [1e-3, 1e6];
 /// Bits of a value.
 const VALUE_BITS: usize = 64;
-
-/// Results of one instant.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Step {
-    /// Level, slope and curvature, as many as the model has, each with its standard deviation.
-    pub(super) estimate: Vec<(f64, f64)>,
-    /// Number of bits sent, number of reports, how many of them were not used because they were too unlikely, and events by sensor.
-    pub(super) bits: usize,
-    pub(super) reports: usize,
-    pub(super) rejected: usize,
-    pub(super) events: Vec<(&'static str, Option<usize>)>,
-    /// Number of sensors whose reports are used, and factor of the process noise.
-    pub(super) used: usize,
-    pub(super) noise_scale: f64,
-}
-
-/// A centre of any number of coordinates.
-pub(super) trait Estimator {
-    /// Adds the next sensor.
-    fn join(&mut self, seat: Seat) -> Result<(), Failure>;
-    /// Number of sensors added.
-    fn seated(&self) -> usize;
-    /// Processes one instant.
-    fn step(&mut self, instant: &Instant) -> Result<Step, Failure>;
-    /// Sets the factor of the change's variance.
-    fn rescale(&mut self, scale: f64) -> Result<(), Failure>;
-    /// Probability that a sensor works, and whether its reports are used.
-    fn health(&self, sensor: usize) -> (f64, bool);
-    /// Number of its reports that were rejected.
-    fn rejected(&self, sensor: usize) -> u64;
-    /// Of a sensor that sends bits: by how many deviations unlikely ones came more often than predicted.
-    fn surprise(&self, sensor: usize) -> Option<f64>;
-    /// The estimates of all steps given all reports, or those up to so many seconds later.
-    fn smoothed(&self, lag: Option<f64>) -> Result<Vec<Vec<(f64, f64)>>, Failure>;
-}
-
-/// Purpose of the centre.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Use {
-    /// Cells are measurements, which sensors of this program quantize.
-    Measurements,
-    /// Cells are reports.
-    Reports,
-    /// Unquantized measurements and no adaptation: the centre serves to compare likelihoods.
-    Comparison,
-}
 
 /// A centre for the model.
 pub(super) fn centre(world: &World, purpose: Use) -> Result<Box<dyn Estimator>, Failure> {
@@ -103,34 +63,25 @@ pub(super) fn centre(world: &World, purpose: Use) -> Result<Box<dyn Estimator>, 
     })
 }
 
-/// How a reading that states its meaning is tested.
-fn tested(bits: &BitString) -> Option<ReportTest> {
-    let reading = StatedReading::from_bits(&NumberFormat::Double, bits).ok()?;
-    Some(if reading.lower == reading.upper {
-        ReportTest::Value(reading.deviation * reading.deviation)
-    } else {
-        ReportTest::Cell(reading.upper - reading.lower)
-    })
-}
-
-/// The same of a sensor that sends on change. Its values come because they are far from the last, so that of right ones too many are on one
-/// side and few are near the forecast. Only an improbable one is tested: it stands for a narrow cell about it.
-fn tested_on_change(bits: &BitString) -> Option<ReportTest> {
-    Some(match tested(bits)? {
-        ReportTest::Value(variance) => ReportTest::Cell(NARROW * variance.sqrt()),
-        cell => cell,
-    })
-}
-
-/// Width of a narrow cell, in deviations.
-const NARROW: f64 = 1e-6;
-
 struct Member {
     seat: Seat,
     node: Box<dyn SensorNode<1>>,
     /// Its last value, less its offset.
     last: Option<f64>,
 }
+
+/// A state before an instant, to which a centre can return.
+struct Mark<B> {
+    /// Number of instants before it.
+    instants: usize,
+    state: CentreState<B>,
+    /// The last value of each member.
+    last: Vec<Option<f64>>,
+}
+
+/// Instants between two marks, and number of marks.
+const MARKED: usize = 16;
+const MARKS: usize = 9;
 
 struct Centre<const D: usize, F: StateFilter<D>> {
     centre: FusionCentre<D, F>,
@@ -143,13 +94,19 @@ struct Centre<const D: usize, F: StateFilter<D>> {
     world: ContinuousLinear<D>,
     /// All beliefs, if they are to be smoothed.
     kept: Option<Vec<Filtered<D>>>,
+    /// The error under noise that lasts, and its deviation in those of the belief at each instant.
+    error: Option<ErrorUnderLasting>,
+    wider: Vec<f64>,
+    interval: f64,
+    instants: usize,
+    marks: Option<VecDeque<Mark<F::Belief>>>,
 }
 
-/// Mean and standard deviation of each coordinate. `zero`: standard deviation of what all values of the level may be off.
-fn moments<const D: usize>(belief: &Gaussian<D>, zero: f64) -> Vec<(f64, f64)> {
+/// Mean and standard deviation of each coordinate. `wider`: factor of the level's; `zero`: standard deviation of what all of its values may be off.
+fn moments<const D: usize>(belief: &Gaussian<D>, wider: f64, zero: f64) -> Vec<(f64, f64)> {
     let deviation = |i: usize| {
         let own = belief.covariance()[(i, i)].sqrt();
-        if i == 0 { own.hypot(zero) } else { own }
+        if i == 0 { (wider * own).hypot(zero) } else { own }
     };
     (0..D).map(|i| (belief.mean()[i], deviation(i))).collect()
 }
@@ -169,7 +126,8 @@ impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
             ..Failures::default()
         };
         let mut centre = FusionCentre::new(&mut rng, model, filter, &prior)?.with_failures(failures)?;
-        centre = centre.with_false_alarms(ALARMS)?;
+        let alarms = if world.is_lasting { ALARMS_IF_LASTING } else { ALARMS };
+        centre = centre.with_false_alarms(alarms)?;
         if world.is_learning && purpose != Use::Comparison {
             let learning = NoiseLearning {
                 // Every sensor adds a term in each row, and they do not depend on each other.
@@ -188,7 +146,57 @@ impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
             rng,
             world: model,
             kept: world.is_smoothed.then(Vec::new),
+            error: None,
+            wider: Vec::new(),
+            interval: world.interval,
+            instants: 0,
+            marks: world.is_followed.then(VecDeque::new),
         })
+    }
+
+    /// The deviation of the error under noise that lasts, in those of the belief. `before`: time and belief before the forecast.
+    fn wider(
+        &mut self,
+        instant: &Instant,
+        events: &[(&'static str, Option<usize>)],
+        before: (f64, Gaussian<D>),
+        forecast: &Gaussian<D>,
+    ) -> f64 {
+        let belief = self.centre.estimate().covariance()[(0, 0)];
+        let used: Vec<bool> = (0..self.members.len()).map(|sensor| self.health(sensor).1).collect();
+        let Some(error) = &mut self.error else { return 1.0 };
+        let change = forecast.covariance()[(0, 0)] - before.1.covariance()[(0, 0)];
+        error.advance((instant.seconds - before.0) / self.interval, change.max(0.0));
+        let mut gains = vec![0.0; self.members.len()];
+        for (sensor, cell) in &instant.reports {
+            let is_taken = used[*sensor] && !events.contains(&("rejected", Some(*sensor)));
+            if cell.is_some_and(f64::is_finite) && is_taken {
+                gains[*sensor] = belief / self.members[*sensor].seat.noise.powi(2);
+            }
+        }
+        // Reports of which one is taken to be wrong count less together.
+        let all: f64 = gains.iter().sum();
+        gains.iter_mut().for_each(|gain| *gain /= all.max(1.0));
+        if events.iter().any(|(event, _)| *event == "reopened") {
+            error.forget(belief);
+        }
+        (error.update(&gains) / belief).sqrt().max(1.0)
+    }
+
+    /// Keeps the present state, if it is time.
+    fn mark(&mut self) {
+        let Some(marks) = &mut self.marks else { return };
+        if self.instants.is_multiple_of(MARKED) {
+            marks.push_back(Mark {
+                instants: self.instants,
+                state: self.centre.state(),
+                last: self.members.iter().map(|member| member.last).collect(),
+            });
+            if marks.len() > MARKS {
+                marks.pop_front();
+            }
+        }
+        self.instants += 1;
     }
 
     fn slot(&mut self, sensor: usize, cell: Option<f64>, qualifier: Qualifier) -> Result<Slot, Failure> {
@@ -235,25 +243,9 @@ impl<const D: usize, F: StateFilter<D>> Estimator for Centre<D, F> {
             seat.sends
         };
         let seat = Seat { sends, ..seat };
-        let variance = seat.noise * seat.noise;
-        let (number, link) = (self.members.len() as u32, Link::lossy(seat.loss)?);
-        if seat.is_stated() {
-            let usual = seat.usual() * seat.usual();
-            let sensing = OnAxes::<_, D, 1>::new(LinearSensor::direct(usual)?, [0])?;
-            let nothing = |_: &Gaussian<D>, _: &Gaussian<1>| ();
-            let remote = Reporting::new(sensing, Stating::new(usual)?, link, nothing)
-                .sending_values()
-                .testing(if seat.meaning.silent_within.is_some() {
-                    tested_on_change
-                } else {
-                    tested
-                });
-            self.centre.join_boxed(number, Box::new(remote))?;
-        } else {
-            self.centre.join_boxed(number, sends.remote::<D>(0, variance, link)?)?;
-        }
+        self.centre.join_boxed(self.members.len() as u32, remote(&seat)?)?;
         self.members.push(Member {
-            node: sends.node::<D>(0, variance)?,
+            node: sends.node::<D>(0, seat.noise * seat.noise)?,
             last: None,
             seat,
         });
@@ -265,8 +257,11 @@ impl<const D: usize, F: StateFilter<D>> Estimator for Centre<D, F> {
     }
 
     fn step(&mut self, instant: &Instant) -> Result<Step, Failure> {
+        self.mark();
         // First the forecast: sensors compare with it, so the feedback of all slots is made before any report is used.
+        let before = (self.centre.time(), self.centre.estimate());
         self.centre.advance(&mut self.rng, instant.seconds)?;
+        let forecast = self.centre.estimate();
         let mut slots = Vec::with_capacity(instant.reports.len());
         let (mut bits, mut reports) = (0, 0);
         for (i, (sensor, cell)) in instant.reports.iter().enumerate() {
@@ -295,6 +290,8 @@ impl<const D: usize, F: StateFilter<D>> Estimator for Centre<D, F> {
         let events: Vec<_> = events.filter(is_meant).collect();
         let rejected = events.iter().filter(|(event, _)| *event == "rejected").count();
         let belief = self.centre.estimate();
+        let wider = self.wider(instant, &events, before, &forecast);
+        self.wider.extend(self.kept.is_some().then_some(wider));
         if let Some(kept) = &mut self.kept {
             kept.push(Filtered {
                 seconds: instant.seconds,
@@ -306,11 +303,12 @@ impl<const D: usize, F: StateFilter<D>> Estimator for Centre<D, F> {
             });
         }
         Ok(Step {
-            estimate: moments(&belief, self.zero),
+            estimate: moments(&belief, wider, self.zero),
             bits,
             reports,
             rejected,
             events,
+            forecast: (forecast.mean()[0], forecast.covariance()[(0, 0)]),
             used: (0..self.members.len()).filter(|sensor| self.health(*sensor).1).count(),
             noise_scale: self.centre.noise_scale(),
         })
@@ -318,6 +316,40 @@ impl<const D: usize, F: StateFilter<D>> Estimator for Centre<D, F> {
 
     fn rescale(&mut self, scale: f64) -> Result<(), Failure> {
         Ok(self.centre.set_noise_scale(scale)?)
+    }
+
+    fn set_noises(&mut self, noises: &[(usize, f64)]) -> Result<(), Failure> {
+        for (sensor, noise) in noises {
+            let member = &mut self.members[*sensor];
+            member.seat.noise = *noise;
+            member.node = member.seat.sends.node::<D>(0, noise * noise)?;
+            self.centre.join_boxed(*sensor as u32, remote(&member.seat)?)?;
+        }
+        Ok(())
+    }
+
+    fn under(&mut self, lasting: &Lasting) {
+        let variance = self.centre.estimate().covariance()[(0, 0)];
+        self.error = Some(ErrorUnderLasting::new(lasting.parts.clone(), variance));
+    }
+
+    fn back(&mut self, instants: usize) -> Option<usize> {
+        let (now, marks) = (self.instants, self.marks.as_mut()?);
+        while marks.len() > 1 && marks.back()?.instants + instants > now {
+            marks.pop_back();
+        }
+        let mark = marks.pop_back()?;
+        self.centre.restore(mark.state).ok()?;
+        self.members
+            .iter_mut()
+            .zip(mark.last)
+            .for_each(|(member, last)| member.last = last);
+        self.instants = mark.instants;
+        if let Some(kept) = &mut self.kept {
+            kept.truncate(mark.instants);
+            self.wider.truncate(mark.instants);
+        }
+        Some(now - mark.instants)
     }
 
     fn health(&self, sensor: usize) -> (f64, bool) {
@@ -336,6 +368,7 @@ impl<const D: usize, F: StateFilter<D>> Estimator for Centre<D, F> {
 
     fn smoothed(&self, lag: Option<f64>) -> Result<Vec<Vec<(f64, f64)>>, Failure> {
         let beliefs = smooth(&self.world, self.kept.as_deref().unwrap_or_default(), lag)?;
-        Ok(beliefs.iter().map(|belief| moments(belief, self.zero)).collect())
+        let all = beliefs.iter().zip(&self.wider);
+        Ok(all.map(|(belief, wider)| moments(belief, *wider, self.zero)).collect())
     }
 }

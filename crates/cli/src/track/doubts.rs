@@ -1,10 +1,13 @@
-//! What the values of a table say against the noise that is stated.
+//! What the values of a table say against the noise that is stated, and against noise that does not last.
 
 use super::first::values_of;
 use super::instant::Instant;
+use super::lasting::lasting;
 use super::settings::Settings;
+use crate::arguments::Model;
 use crate::numbers::short;
-use fewbits_filters::calibration::Number;
+use crate::report::Report;
+use fewbits_filters::calibration::{Number, median};
 
 /// The stated noise is doubted if another explains the rows better by so many nats, and is so many times as large or small.
 const FAR_LIKELIER: f64 = 20.0;
@@ -51,5 +54,36 @@ impl Settings {
                 )
             })
             .collect()
+    }
+
+    /// Finds errors of sensors that last from row to row, and the change and noises under them, as far as they may be found.
+    pub(super) fn find_lasting(&mut self, rows: &[Instant], names: &[String]) {
+        let is_plain = |(sensor, name): (usize, &String)| {
+            let seat = self.seat(sensor, name);
+            seat.sends == Report::Value && !seat.is_stated()
+        };
+        let is_walk = self.world.model == Model::Walk && self.world.period.is_none() && !self.world.is_on_grid;
+        if !is_walk || !names.iter().enumerate().all(is_plain) {
+            return;
+        }
+        let Some(found) = lasting(rows, names.len()) else {
+            return;
+        };
+        for (name, parts) in names.iter().zip(&found.parts).filter(|(_, parts)| parts.lasting > 0.0) {
+            self.hints.push(format!(
+                "{name}: its errors last for several rows (the correlation of {} of their variance with the next row is {}): bands allow for it",
+                short(parts.lasting / (parts.lasting + parts.plain)),
+                short(parts.rho)
+            ));
+        }
+        self.found = found
+            .parts
+            .iter()
+            .map(|parts| (parts.lasting + parts.plain).sqrt())
+            .collect();
+        self.noise = median(self.found.clone());
+        self.world.change = (found.change * self.world.within / self.world.interval).sqrt();
+        (self.world.is_learning, self.world.is_lasting) = (false, true);
+        (self.later, self.lasting) = (None, Some(found));
     }
 }

@@ -102,7 +102,7 @@ pub(crate) fn run(options: &FitOptions) -> Result<Ending, Error> {
                 "{name} goes around a circle of {period}, which is not calibrated here: a step across its ends counts as a jump of the level"
             );
         } else {
-            growth(&values, name)
+            growth(&values, name, false)
                 .iter()
                 .for_each(|line| say!("{line}; here the noise is a mean over all values"));
         }

@@ -34,8 +34,6 @@ const LOSS_ALONE: f64 = 5.0;
 /// Share of values beyond a limit up to which the mean and the deviation of all say those of the level.
 const MOST_CUT: f64 = 0.05;
 
-/// Deviation of the level before the last rows, in deviations of the noise.
-const WIDE: f64 = 10.0;
 /// Least guess of the change, as a share of the noise.
 const LEAST_GUESS: f64 = 0.01;
 
@@ -301,41 +299,13 @@ impl Settings {
         is_taken
     }
 
-    /// The factor of the change's variance under which the last rows are likeliest, if it is above `scale` and larger noises explain them less.
-    pub(super) fn raised(&self, rows: &[Instant], names: &[String], scale: f64) -> Option<f64> {
-        let readings = self.readings(rows, names);
-        let mut values = readings.iter().flat_map(|instant| &instant.values);
-        let origin = values.find_map(|(_, reading)| reading.value())?;
-        let world = World {
-            prior: (origin, WIDE * self.noise),
-            ..self.world
-        };
-        let supposed = self.world.change * scale.sqrt();
-        let raised = |number: f64| Number::Unknown {
-            guess: number,
-            least: number,
-        };
-        let known = |number: &Number| match number {
-            Number::Known(number) | Number::Unknown { guess: number, .. } => *number,
-        };
-        let (_, noises) = self.numbers(names, None);
-        let found = world.calibrate(&readings, raised(supposed), supposed, &noises).ok()?;
-        // A noise that has become larger loses the level too.
-        let noisier: Vec<Number> = noises.iter().map(|noise| raised(known(noise))).collect();
-        let other = world.calibrate(&readings, Number::Known(supposed), supposed, &noisier);
-        if other.is_ok_and(|other| other.log_likelihood > found.log_likelihood) {
-            return None;
-        }
-        (found.change > supposed).then(|| (found.change / self.world.change).powi(2))
-    }
-
     /// Sensors whose innovations in the first rows repeat, or return: each wrongly with one in a thousand tables. Only of a level that wanders, read by
     /// values.
     pub(super) fn repeating(&self, first: &[Instant], names: &[String]) -> Vec<String> {
         let readings = self.readings(first, names);
         let is_value = |(_, reading): &(usize, calibration::Reading)| reading.value().is_some();
         let are_values = readings.iter().all(|instant| instant.values.iter().all(is_value));
-        if self.world.model != Model::Walk || self.world.period.is_some() || !are_values {
+        if self.world.model != Model::Walk || self.world.period.is_some() || !are_values || self.lasting.is_some() {
             return Vec::new();
         }
         // A constant offset, which is told elsewhere, would last too.

@@ -7,6 +7,7 @@
 //! By chance that share is then at most .06. Repetitions say nothing new: taken for measurements, they make bands too narrow.
 
 use super::instant::Instant;
+use super::marks::Marks;
 use fewbits_numerics::Runs;
 use std::collections::VecDeque;
 
@@ -25,9 +26,12 @@ struct Column {
     runs: Runs,
 }
 
-/// Leaves repetitions out of rows.
+/// Leaves repetitions, and numbers that stand for gaps, out of rows.
 #[derive(Debug)]
-pub(super) struct Held(Vec<Column>);
+pub(super) struct Held {
+    columns: Vec<Column>,
+    marks: Marks,
+}
 
 /// Longest run of repetitions in values, if they are held.
 fn held(values: &[f64]) -> Option<u32> {
@@ -52,8 +56,9 @@ fn held(values: &[f64]) -> Option<u32> {
 }
 
 impl Held {
-    /// Leaves repetitions out of the first rows; `None` if no column of them holds its values.
-    pub(super) fn begin(first: &mut VecDeque<Instant>, sensors: usize) -> Option<Self> {
+    /// Leaves them out of the first rows.
+    pub(super) fn begin(first: &mut VecDeque<Instant>, sensors: usize) -> Self {
+        let marks = Marks::begin(first, sensors);
         let of = |sensor: usize| {
             let all = first.iter().flat_map(|instant| &instant.reports);
             let own = all.filter(|(other, _)| *other == sensor);
@@ -65,23 +70,32 @@ impl Held {
                 ..Column::default()
             }
         };
-        let mut held = Self((0..sensors).map(of).collect());
-        held.sensors().next()?;
+        let columns = (0..sensors).map(of).collect();
+        let mut held = Self { columns, marks };
         first.iter_mut().for_each(|row| held.leave_out(row));
-        Some(held)
+        held
     }
 
     /// The sensors whose columns hold their values.
     pub(super) fn sensors(&self) -> impl Iterator<Item = usize> + '_ {
-        let all = self.0.iter().enumerate();
+        let all = self.columns.iter().enumerate();
         all.filter(|(_, column)| column.longest > 0).map(|(sensor, _)| sensor)
     }
 
-    /// Takes repetitions out of the next row, as if the sensor had not been asked.
+    /// What numbers are taken for gaps.
+    pub(super) fn hints(&self, names: &[String]) -> Vec<String> {
+        self.marks.hints(names)
+    }
+
+    /// Takes them out of the next row; a repetition as if the sensor had not been asked.
     pub(super) fn leave_out(&mut self, row: &mut Instant) {
+        self.marks.leave_out(row);
+        if self.sensors().next().is_none() {
+            return;
+        }
         let mut stays = Vec::with_capacity(row.reports.len());
         for (sensor, cell) in &row.reports {
-            let Some(column) = self.0.get_mut(*sensor).filter(|column| column.longest > 0) else {
+            let Some(column) = self.columns.get_mut(*sensor).filter(|column| column.longest > 0) else {
                 stays.push(true);
                 continue;
             };

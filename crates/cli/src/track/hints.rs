@@ -113,17 +113,17 @@ pub(super) fn hints(
     lines
 }
 
-/// What a sensor's noise grows with, if it does.
-pub(super) fn growth(values: &[f64], name: &str) -> Option<String> {
+/// What a sensor's noise grows with, if it does. `has_changed`: it is known that it changes.
+pub(super) fn growth(values: &[f64], name: &str, has_changed: bool) -> Option<String> {
     let transform = Transform::suggested(values).filter(|transform| {
         let transformed: Vec<f64> = values.iter().map(|value| transform.of(*value)).collect();
-        unsteady(&transformed, name).is_none()
+        unsteady(&transformed, name, false).is_none()
     });
-    transform.map_or_else(|| unsteady(values, name), |transform| Some(transform.hint(name)))
+    transform.map_or_else(|| unsteady(values, name, has_changed), |transform| Some(transform.hint(name)))
 }
 
 /// Stretches in which values scatter far more than in others. Second differences hardly depend on a level that moves slowly.
-fn unsteady(values: &[f64], name: &str) -> Option<String> {
+fn unsteady(values: &[f64], name: &str, has_changed: bool) -> Option<String> {
     let length = values.len() / STRETCHES;
     if length < FEWEST_BITS {
         return None;
@@ -143,11 +143,16 @@ fn unsteady(values: &[f64], name: &str) -> Option<String> {
     (least.1 > 0.0 && most.1 > UNSTEADY * least.1).then(|| {
         let from = |stretch: usize| stretch * length + 1;
         format!(
-            "{name} scatters {} times as much from its value {} on as from its value {}: one noise and one change fit not both, and bands are too narrow \
-             or too wide; take parts by themselves, or say what each value's noise is (--accuracy-column)",
+            "{name} scatters {} times as much from its value {} on as from its value {}: {}",
             short((most.1 / least.1).round()),
             from(most.0),
-            from(least.0)
+            from(least.0),
+            if has_changed {
+                "its noise is followed"
+            } else {
+                "one noise and one change fit not both, and bands are too narrow or too wide; take parts by themselves, or say what each value's noise \
+                 is (--accuracy-column)"
+            }
         )
     })
 }
@@ -289,7 +294,8 @@ impl Turning {
     }
 
     /// A line for each sensor that turns, and for each of which the noise grows.
-    pub(super) fn hints(&self, names: &[String]) -> Vec<String> {
+    /// `has_changed`: whether it is known that the noise of a sensor changes.
+    pub(super) fn hints(&self, names: &[String], has_changed: impl Fn(usize) -> bool) -> Vec<String> {
         let of = |(turns, name): (&Option<Turns>, &String)| {
             let period = turns.as_ref()?.period()?;
             Some(format!(
@@ -301,7 +307,8 @@ impl Turning {
             .values
             .iter()
             .zip(names)
-            .filter_map(|(values, name)| growth(values, name));
+            .enumerate()
+            .filter_map(|(sensor, (values, name))| growth(values, name, has_changed(sensor)));
         turning.chain(growing).collect()
     }
 }

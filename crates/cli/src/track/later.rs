@@ -1,10 +1,6 @@
 //! Change and noise found again while rows come: the first rows hardly tell a small change, and a level that rests in them may move later.
 
 use super::instant::Instant;
-use std::collections::VecDeque;
-
-/// Last rows from which the change is found if the level is lost.
-const LAST: usize = 32;
 
 /// What is found from the first rows, and the deviation of rounding, which a noise is not below.
 pub(super) struct Unknown {
@@ -60,37 +56,5 @@ impl Later {
             usize::MAX
         };
         Some(&self.rows)
-    }
-}
-
-/// The last rows of a level whose change is learnt.
-pub(super) struct Last {
-    rows: VecDeque<Instant>,
-    most: usize,
-}
-
-impl Last {
-    /// `reports`: rows in which each sensor reports once.
-    pub(super) fn new(reports: usize) -> Self {
-        Self {
-            rows: VecDeque::new(),
-            most: LAST * reports,
-        }
-    }
-
-    /// Adds a row; `is_used`: whether a sensor's values count.
-    pub(super) fn add(&mut self, row: &Instant, is_used: impl Fn(usize) -> bool) {
-        let mut row = row.clone();
-        for (sensor, cell) in &mut row.reports {
-            *cell = cell.filter(|_| is_used(*sensor));
-        }
-        self.rows.push_back(row);
-        if self.rows.len() > self.most {
-            self.rows.pop_front();
-        }
-    }
-
-    pub(super) fn rows(&mut self) -> &[Instant] {
-        self.rows.make_contiguous()
     }
 }

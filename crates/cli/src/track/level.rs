@@ -1,30 +1,26 @@
 //! Tracking of a level that sensors measure: estimates with bands, row by row.
 
-use super::centre::{Estimator, Step, Use, centre};
+use super::centre::centre;
+use super::estimator::{Estimator, Step, Use};
+use super::followed::{Followed, Shift};
 use super::hints::Turning;
 use super::instant::Instant;
-use super::later::Last;
 use super::meaning::Seat;
-use super::report::{BAND, Shown, cells, events, first_cell, first_name, summarise};
+use super::picture::{Drawn, Picked};
+use super::report::{Shown, cells, events, first_cell, first_name, summarise};
 use super::rhythm::Rhythm;
 use super::rows::Instants;
 use super::settings::Settings;
 use super::stuck::Stuck;
 use super::summary::{EventSummary, SensorSummary, Summary, lines};
 use crate::Ending;
-use crate::arguments::{Model, TrackOptions};
+use crate::arguments::{Model, Switch, TrackOptions};
 use crate::error::{Error, Failure};
 use crate::output::{Shape, Sheet};
-use crate::plot::{Layer, Picture, Thinned};
+use crate::plot::{Picture, Thinned};
 
 /// Largest number of events in the summary.
 const MAX_EVENTS: usize = 1000;
-
-struct Picked {
-    seconds: f64,
-    estimate: (f64, f64),
-    full: Option<f64>,
-}
 
 /// An event, and its sensor.
 type Happened = (&'static str, Option<usize>);
@@ -37,16 +33,15 @@ struct Run {
     centre: Box<dyn Estimator>,
     /// The same sensors without quantization.
     full: Option<Box<dyn Estimator>>,
-    /// The last rows, from which the change is found if the level is lost.
-    last: Option<Last>,
     squares: f64,
     summary: Summary,
-    path: Thinned<Picked>,
-    measured: Thinned<(f64, f64)>,
+    drawn: Drawn,
+    /// The noise of sensors as rows show it.
+    followed: Option<Followed>,
 }
 
 impl Run {
-    fn new(options: &TrackOptions, settings: Settings, instants: &Instants) -> Result<Self, Error> {
+    fn new(options: &TrackOptions, mut settings: Settings, instants: &Instants) -> Result<Self, Error> {
         let refused = |source: Failure| Error::Refused {
             what: "the model is refused",
             source,
@@ -57,20 +52,23 @@ impl Run {
             Use::Measurements
         };
         let is_quantized = !options.reports && settings.has_bits(&instants.names);
+        settings.world.is_followed = !options.reports
+            && !is_quantized
+            && settings.lasting.is_none()
+            && !settings.world.is_on_change
+            && options.learning != Some(Switch::Off);
         let full = is_quantized
             .then(|| centre(&settings.world, Use::Comparison))
             .transpose();
+        let mut centre = centre(&settings.world, purpose).map_err(refused)?;
+        if let Some(lasting) = &settings.lasting {
+            centre.under(lasting);
+        }
         Ok(Self {
             purpose,
-            centre: centre(&settings.world, purpose).map_err(refused)?,
+            centre,
             full: full.map_err(refused)?,
             file: instants.file().to_owned(),
-            // A level that returns has no standard deviation of steps.
-            last: (settings.world.is_learning
-                && settings.world.model != Model::Returning
-                && !options.reports
-                && !is_quantized)
-                .then(|| Last::new(options.table.by.as_ref().map_or(1, |_| instants.names.len().max(1)))),
             squares: 0.0,
             summary: Summary {
                 rows: 0,
@@ -88,9 +86,12 @@ impl Run {
                 is_silence_said: settings.meaning.silent_within.is_some(),
                 hints: settings.hints.clone(),
             },
+            followed: settings.world.is_followed.then(Followed::default),
             settings,
-            path: Thinned::new(),
-            measured: Thinned::new(),
+            drawn: Drawn {
+                path: Thinned::new(),
+                measured: Thinned::new(),
+            },
         })
     }
 
@@ -132,6 +133,7 @@ impl Run {
                 Ok(centre)
             };
             self.centre = again(self.purpose).map_err(refused)?;
+            self.followed = self.followed.take().map(|_| Followed::default());
             if self.full.is_some() {
                 self.full = Some(again(Use::Comparison).map_err(refused)?);
             }
@@ -147,8 +149,9 @@ impl Run {
 
     /// Processes a row, whose events come after those `before`.
     fn step(&mut self, instant: &Instant, names: &[String], before: Vec<Happened>) -> Result<Step, Error> {
+        let file = self.file.clone();
         let refused = |source: Failure| Error::Row {
-            file: self.file.clone(),
+            file: file.clone(),
             row: instant.row,
             source,
         };
@@ -172,14 +175,7 @@ impl Run {
             });
         }
         let mut step = self.centre.step(instant).map_err(refused)?;
-        if let Some(last) = &mut self.last {
-            last.add(instant, |sensor| self.centre.health(sensor).1);
-            if step.events.iter().any(|(event, _)| *event == "lost")
-                && let Some(scale) = self.settings.raised(last.rows(), names, step.noise_scale)
-            {
-                self.centre.rescale(scale).map_err(refused)?;
-            }
-        }
+        self.follow(instant, names, &mut step)?;
         step.events.splice(0..0, before);
         let full = self
             .full
@@ -209,13 +205,60 @@ impl Run {
         }
         let full = full.map(|full| full.estimate[0].0);
         self.squares += full.map_or(0.0, |full| (full - step.estimate[0].0).powi(2));
-        self.path.push(Picked {
+        self.drawn.path.push(Picked {
             seconds: instant.seconds,
             estimate: step.estimate[0],
             full,
         });
         self.learn(instant, names)?;
         Ok(step)
+    }
+
+    /// Looks whether the noise of sensors is another than supposed. If so, rows are gone through anew from where it changed.
+    fn follow(&mut self, instant: &Instant, names: &[String], step: &mut Step) -> Result<(), Error> {
+        let Some(followed) = &mut self.followed else {
+            return Ok(());
+        };
+        let settings = &self.settings;
+        let sensors = self.summary.sensors.iter().enumerate();
+        let all: Vec<f64> = sensors.map(|(sensor, one)| followed.noise(sensor, one.noise)).collect();
+        let used: Vec<bool> = (0..all.len()).map(|sensor| self.centre.health(sensor).1).collect();
+        let is_followed = |sensor: usize| used[sensor] && settings.step_of(sensor).is_none();
+        let noise = |(sensor, noise): (usize, &f64)| is_followed(sensor).then_some(*noise);
+        let noises: Vec<Option<f64>> = all.iter().enumerate().map(noise).collect();
+        followed.add(instant, step, settings, &noises);
+        let Some(Shift {
+            mut noises,
+            rows,
+            scale,
+        }) = followed.shift(settings, names, &all, &used, step.noise_scale)
+        else {
+            return Ok(());
+        };
+        // What is stated is kept.
+        noises.retain(|(sensor, _)| settings.noises.of(&names[*sensor]).is_none());
+        if noises.is_empty() && scale.is_none() {
+            return Ok(());
+        }
+        self.settings.later = None;
+        let refused = |source: Failure| Error::Row {
+            file: self.file.clone(),
+            row: instant.row,
+            source,
+        };
+        followed.take(&noises);
+        self.centre.set_noises(&noises).map_err(refused)?;
+        let events = noises.iter().map(|(sensor, _)| ("noise changed", Some(*sensor)));
+        let mut events: Vec<Happened> = events.collect();
+        let back = self.centre.back(rows.len());
+        if let Some(scale) = scale {
+            self.centre.rescale(scale).map_err(refused)?;
+        }
+        for row in followed.last(back.unwrap_or(0)) {
+            *step = self.centre.step(row).map_err(refused)?;
+        }
+        step.events.append(&mut events);
+        Ok(())
     }
 
     fn finish(mut self, options: &TrackOptions) -> Result<(Summary, Picture), Error> {
@@ -227,54 +270,9 @@ impl Run {
             sensor.rejected = self.centre.rejected(number);
             sensor.surprise = self.centre.surprise(number);
         }
-        let points = self.path.points();
-        let value = |number: f64| options.transform.map_or(number, |transform| transform.inverse(number));
-        let edge = |sign: f64| {
-            let at = |picked: &Picked| (picked.seconds, value(picked.estimate.0 + sign * BAND * picked.estimate.1));
-            points.iter().map(at).collect::<Vec<_>>()
-        };
-        let mut layers = vec![
-            Layer::Band {
-                lower: edge(-1.0),
-                upper: edge(1.0),
-                colour: 0,
-            },
-            Layer::Dots {
-                points: self.measured.points().to_vec(),
-                colour: 6,
-                name: if options.reports {
-                    String::new()
-                } else {
-                    "measurements".to_owned()
-                },
-            },
-        ];
-        if self.full.is_some() {
-            layers.push(Layer::Line {
-                points: points
-                    .iter()
-                    .filter_map(|p| Some((p.seconds, value(p.full?))))
-                    .collect(),
-                colour: 1,
-                name: "estimate from values in full".to_owned(),
-            });
-        }
-        layers.push(Layer::Line {
-            points: points.iter().map(|p| (p.seconds, value(p.estimate.0))).collect(),
-            colour: 0,
-            name: "estimate, band of 95 %".to_owned(),
-        });
-        let picture = Picture {
-            title: format!(
-                "{}: {} rows, {:.2} bits per report",
-                self.file, self.summary.rows, self.summary.bits_per_report
-            ),
-            x: "seconds since the first row".to_owned(),
-            y: "level".to_owned(),
-            is_log: false,
-            is_map: false,
-            layers,
-        };
+        let title =
+            format!("{}: {} rows, {:.2} bits per report", self.file, self.summary.rows, self.summary.bits_per_report);
+        let picture = self.drawn.picture(options, title, self.full.is_some());
         Ok((self.summary, picture))
     }
 }
@@ -342,7 +340,7 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
                 .iter()
                 .filter_map(|(_, cell)| *cell)
                 .filter(|cell| cell.is_finite());
-            values.for_each(|number| run.measured.push((instant.seconds, value(number))));
+            values.for_each(|number| run.drawn.measured.push((instant.seconds, value(number))));
         }
         let first = first_cell(&instants, instant.time.clone());
         let events = events(&step, &instants.names);
@@ -372,7 +370,14 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
         run.summary.hints.push(hint.to_owned());
     }
     run.summary.hints.extend(instants.strange_accuracies());
-    run.summary.hints.extend(turning.hints(&instants.names));
+    let changes = |followed: &Followed| followed.hints(&run.settings, &instants.names);
+    run.summary.hints.extend(run.followed.iter().flat_map(changes));
+    let has_changed = |sensor: usize| {
+        run.followed
+            .as_ref()
+            .is_some_and(|followed| followed.has_changed(sensor))
+    };
+    run.summary.hints.extend(turning.hints(&instants.names, has_changed));
     let lines_of = |stuck: &Stuck| stuck.hints(&instants.names);
     run.summary.hints.extend(stuck.iter().flat_map(lines_of));
     let (summary, picture) = run.finish(options)?;

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `rows`, `columns` | the table as instants, which of its columns are no sensors |
 //! | `sensors` | reports as options and tables have them |
-//! | `centre` | the centre of a level |
+//! | `centre`, `estimator`, `remote` | the centre of a level, its half of a sensor |
 //! | `meaning` | what the cells of a sensor mean |
 //! | `settings` | what options and first rows say |
 //! | `first` | values of the first rows |
@@ -12,15 +12,17 @@
 //! | `later` | the same again while rows come |
 //! | `hints` | what the first rows suggest that no option says |
 //! | `doubts` | what the values say against the stated noise |
+//! | `followed` | noise that changes while rows come |
+//! | `lasting` | errors that last from row to row |
 //! | `transform` | roots and logarithms of values |
 //! | `stuck` | sensors that repeat one value |
-//! | `limits` | detection limits |
+//! | `limits`, `marks`, `units` | detection limits, numbers that stand for gaps, changes of the unit |
 //! | `late` | rows that come late |
 //! | `rhythm` | silence in a table of single reports |
 //! | `report` | first cell of a row, summary |
 //! | `applied` | what `fit` found, as settings |
 //! | `fit` | the task `fit`: calibration |
-//! | `level` | the task `track`: a level |
+//! | `level`, `picture` | the task `track`: a level, and its picture |
 //! | `ranges` | the task `ranges`: a place |
 //! | `anchors`, `odometry`, `path` | the table of its anchors, the columns of what the target moved, the picture |
 //! | `leak`, `leak_rooms` | the task `leak`: a room, and the file of rooms |
@@ -32,24 +34,30 @@ mod centre;
 mod columns;
 mod divisor;
 mod doubts;
+mod estimator;
 mod first;
 mod fit;
+mod followed;
 mod found;
 mod height;
 mod held;
 mod hints;
 mod instant;
+mod lasting;
 mod late;
 mod later;
 mod leak;
 mod leak_rooms;
 mod level;
 mod limits;
+mod marks;
 mod meaning;
 mod mistakes;
 mod odometry;
 mod path;
+mod picture;
 mod ranges;
+mod remote;
 mod report;
 mod rhythm;
 mod rows;
@@ -61,6 +69,7 @@ mod stuck;
 mod summary;
 mod targets;
 mod transform;
+mod units;
 mod world;
 
 pub(crate) use transform::Transform;

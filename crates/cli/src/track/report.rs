@@ -1,6 +1,6 @@
 //! Common output of both tasks: the first cell of a row, bands, a summary.
 
-use super::centre::Step;
+use super::estimator::Step;
 use super::rows::Instants;
 use super::transform::Transform;
 use crate::error::Error;

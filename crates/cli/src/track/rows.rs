@@ -155,11 +155,11 @@ impl Instants {
         self.table.is_live()
     }
 
-    /// What was made of accuracies that are none, a line each.
+    /// What was made of accuracies that are none, and of numbers that stand for gaps, a line each.
     pub(super) fn strange_accuracies(&self) -> Vec<String> {
         let name = self.roles.accuracy.as_deref().unwrap_or_default();
         let [unknown, void] = self.strange;
-        let mut lines = Vec::new();
+        let mut lines: Vec<String> = self.held.iter().flat_map(|held| held.hints(&self.names)).collect();
         if unknown > 0 {
             lines.push(format!(
                 "{name} is 0 or below in {unknown} rows: their values have the noise of the sensor; if it marks values that are void, leave those \
@@ -198,7 +198,7 @@ impl Instants {
 
     /// Leaves repetitions of columns that hold their values out of the rows that were read ahead and of all that follow. The sensors.
     pub(super) fn leave_out_repetitions(&mut self) -> Vec<usize> {
-        self.held = Held::begin(&mut self.ahead, self.names.len());
+        self.held = Some(Held::begin(&mut self.ahead, self.names.len()));
         self.held.iter().flat_map(Held::sensors).collect()
     }
 

@@ -3,6 +3,7 @@
 use super::first::{held_values, values, values_in, values_of};
 use super::hints::{circle, hints};
 use super::instant::Instant;
+use super::lasting::Lasting;
 use super::later::Later;
 use super::limits::{self, limits};
 use super::meaning::{Meaning, Seat, silence};
@@ -64,6 +65,8 @@ pub(super) struct Settings {
     pub(super) hints: Vec<String>,
     /// What is found again while rows come.
     pub(super) later: Option<Later>,
+    /// Errors that last from row to row.
+    pub(super) lasting: Option<Lasting>,
 }
 
 /// Parses `0.5/1h`. Numbered rows are one second apart.
@@ -206,6 +209,7 @@ impl Settings {
             has_slope: false,
             hints: told,
             later: None,
+            lasting: None,
             may_slope: options.model.is_none(),
             circle: period.map(|period| Circle {
                 period,
@@ -235,6 +239,8 @@ impl Settings {
                 // Of single reports nothing tells the noise, and a wrong one misleads an exact filter more.
                 is_on_grid: within.is_some() && (asked_noise.is_some() || options.table.by.is_none()),
                 is_on_change: within.is_some(),
+                is_followed: false,
+                is_lasting: false,
                 zero: 0.0,
                 is_learning: options
                     .learning
@@ -310,6 +316,9 @@ impl Settings {
                     settings.refine((&first, more), &instants.names, &unknown);
                 }
             }
+        }
+        if options.noise.is_empty() && asked_change.is_none() && !options.reports && !instants.has_samples() {
+            settings.find_lasting(&more, &instants.names);
         }
         // Cells have no residual that would tell whether the change is right.
         let has_cells = is_cut

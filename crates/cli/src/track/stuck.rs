@@ -1,6 +1,7 @@
 //! Sensors that repeat one value to its last digit, though their values hardly ever did so before, and sensors that repeat another one.
 
 use super::instant::Instant;
+use super::units::Units;
 use crate::say;
 use fewbits_numerics::Runs;
 use fewbits_table::names::as_argument;
@@ -15,19 +16,21 @@ const ALIKE: f64 = 0.95;
 /// Of more sensors no pairs are compared.
 const MAX_COMPARED: usize = 32;
 
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 struct Repeats {
     runs: Runs,
     /// The value of the longest run of one that is stuck, and its length.
     stuck: Option<(f64, u32)>,
     /// The smallest and the largest value, for each: the present one, and the next one to it.
     ends: Option<[(f64, f64); 2]>,
+    units: Units,
 }
 
 impl Repeats {
     fn add(&mut self, value: f64) {
         self.runs.add(value);
         self.widen(value);
+        self.units.add(value);
         let run = self.runs.repetitions.saturating_add(1);
         let is_longest = self.stuck.is_none_or(|(_, longest)| run > longest);
         if run >= LONG && self.is_seldom() && is_longest {
@@ -132,6 +135,8 @@ impl Stuck {
             })
         };
         let stuck = self.repeats.iter().zip(names).filter_map(stuck);
-        stuck.chain(self.pairs.iter().filter_map(copy)).collect()
+        let units = self.repeats.iter().zip(names);
+        let units = units.filter_map(|(repeats, name)| repeats.units.hint(&say::name(name)));
+        stuck.chain(units).chain(self.pairs.iter().filter_map(copy)).collect()
     }
 }

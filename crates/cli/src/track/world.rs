@@ -31,6 +31,10 @@ pub(super) struct World {
     pub(super) sensors: usize,
     /// Whether all beliefs are kept, to be smoothed.
     pub(super) is_smoothed: bool,
+    /// Whether the noise of sensors is followed, so that the centre may return to states before.
+    pub(super) is_followed: bool,
+    /// Whether errors of sensors last from row to row.
+    pub(super) is_lasting: bool,
     /// Standard deviation of what the offsets that were found shift all values.
     pub(super) zero: f64,
     /// Whether readings cut the belief so that it is no Gaussian: it is then followed on a grid.

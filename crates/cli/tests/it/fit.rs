@@ -176,7 +176,7 @@ fn track_tells_of_noise_that_is_not_as_supposed() {
     for (kind, line) in [
         ("shared", "turn back"),
         ("lasting", "last for several rows"),
-        ("grows", "its noise is larger than supposed"),
+        ("grows", "its noise changes: 0."),
     ] {
         let told = told(kind);
         assert!(told.contains(line), "{kind}: {told}");

@@ -33,6 +33,7 @@ mod track_found;
 mod track_kinds;
 mod track_meanings;
 mod track_moves;
+mod track_noise;
 mod track_random;
 
 use std::io::{BufRead, BufReader, Write};
