@@ -6,6 +6,7 @@ use crate::grid::{DECIMALS, Grid, PHASES};
 use crate::head::{CIRCLE, Coding, Head, LINE, SAMPLES, SINGLE, STORED, TABLED, WRAPPED};
 use crate::indices::{from_pco_bytes, from_wrapped_pco, raw_samples, read_block};
 use crate::rows::Others;
+use crate::sections::SECTIONS;
 use crate::{Accuracy, BlockCodec, Error, check_rows, learned, levels, stored};
 
 impl BlockCodec {
@@ -29,6 +30,14 @@ impl BlockCodec {
                 left => Err(Damaged::new("block", format!("{left} bytes"), "none for no rows").into()),
             };
         }
+        match bytes.strip_prefix(&SECTIONS) {
+            Some(sections) => self.decode_sections(sections, rows),
+            None => self.decode_section(bytes, rows, others),
+        }
+    }
+
+    /// The samples of a block without sections, of at least one row.
+    pub(crate) fn decode_section(&self, bytes: &[u8], rows: usize, others: &[&[f64]]) -> Result<Vec<f64>, Error> {
         let mut bytes = Bytes(bytes);
         let head = self.read_head(&mut bytes, rows)?;
         let rest = bytes.0;

@@ -25,6 +25,7 @@
 //! | anchor | 8 | a point of the line, little-endian; otherwise zero is one |
 //! | phase | 1 | the grid of a line, or of cells of several decimals, is moved by so many sixteenths of a cell (1 to 15; whole decimals, rounded up) |
 //! | exceptions | varints and 8 each | number; rows since the last one; the sample |
+//! | sections | the rest | in place of all others behind the bytes 8f c0, module `sections`: rows whose kind changes, written with [`Effort::Fast`] |
 //! | indices | the rest | models: 6 bits length (48 more if contexts have the lengths of rests: of blocks of 1024 rows or more, where the length is below 16) and as many bits of the first index (zigzag), then decisions (`model.rs`), all arithmetic coded; counts: the same with a bit behind the first index (1: differences of differences) and other decisions (`counts.rs`); tables: module `stored`, or `learned`; levels: module `levels`; pco: its standalone or, as written since version 6 of recordings, its wrapped format with one chunk and one page |
 //!
 //! There is no checksum, no length and no number of rows: the container must store all three. An arithmetic code has no redundancy, so most
@@ -49,6 +50,7 @@ mod model;
 mod plain;
 mod priors;
 mod rows;
+mod sections;
 mod start;
 mod stored;
 mod vectors;
