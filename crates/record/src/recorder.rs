@@ -77,7 +77,7 @@ impl Recorder<File> {
     pub fn resume(path: impl AsRef<Path>) -> Result<Self, Error> {
         let (file, append, resumed) = resume::open(path.as_ref())?;
         let schema = resumed.header.schema.clone();
-        let first = resumed.header.to_bytes().len() as u64;
+        let first = resumed.header.length as u64;
         Ok(Self {
             header: Some(resumed.header),
             next_tick: resumed.next_tick,

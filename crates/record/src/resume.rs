@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::header::{Form, Header, VERSION_5};
 use crate::index::{self, BLOCKS_PER_SEGMENT, Entry, Segment};
 use crate::playback::{self, Index};
-use crate::scan::{Kind, Scanner, decoded};
+use crate::scan::{Kind, Scanner};
 use crate::wire::checked;
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
@@ -33,7 +33,7 @@ pub(crate) fn open(path: &Path) -> Result<(File, Append, Resumed), Error> {
     if !is_still_there(&file, path) {
         return Err(Error::Locked);
     }
-    let (header, single) = Scanner::new(0).header(&mut file)?;
+    let (header, single) = Scanner::default().header(&mut file)?;
     if let Some(content) = single {
         return copied(file, path, header, &content);
     }
@@ -92,7 +92,7 @@ fn copy(locked: File, path: &Path) -> Result<(File, Append), Error> {
 /// A copy of a recording of version 5 with the heads of this version. Its blocks keep their bytes otherwise.
 fn renewed(mut locked: File, path: &Path, old: &Header) -> Result<(File, Append, Resumed), Error> {
     locked.seek(SeekFrom::Start(0)).map_err(Error::io("read"))?;
-    let mut scanner = Scanner::new(0);
+    let mut scanner = Scanner::default();
     scanner.header(&mut locked)?;
     let mut reader = locked.try_clone().map_err(Error::io("open"))?;
     let (mut file, append) = copy(locked, path)?;
@@ -112,14 +112,10 @@ fn renewed(mut locked: File, path: &Path, old: &Header) -> Result<(File, Append,
         if found.kind != Kind::Block {
             continue;
         }
-        let block = decoded(old, &scanner, &found, |_| true)?;
+        let block = scanner.decoded(old, &found, |_| true)?;
         let content = block::content_of(scanner.bytes(&found));
         let content = content.and_then(|content| block::renewed(old, content, state.next_number));
-        let content = content.map_err(|damage| Error::Block {
-            offset: found.offset,
-            bytes: found.length as u64,
-            damage,
-        })?;
+        let content = content.map_err(|damage| found.damaged(damage))?;
         let bytes = checked(state.header.check, &[], &content);
         file.write_all(&bytes).map_err(Error::io("copy"))?;
         state.offset += bytes.len() as u64;
@@ -148,7 +144,7 @@ fn copied(locked: File, path: &Path, header: Header, content: &[u8]) -> Result<(
         bytes: content.len() as u64,
         damage,
     };
-    let block = block::decode_content(&header, content, |_| true).map_err(damaged)?;
+    let block = block::only(&header, content, content.len() as u64, |_| true)?;
     let content = block::renewed(&header, content, 0).map_err(damaged)?;
     let header = header.with_form(Form::File).renewed();
     let (start, bytes) = (header.to_bytes(), checked(header.check, &[], &content));
@@ -181,7 +177,7 @@ fn next_tick(segments: &[Segment], entries: &[Entry]) -> i64 {
 
 /// The state from footer and last segment; `None` if the last segment or block is damaged.
 fn from_index(file: &mut File, header: &Header, mut segments: Vec<Segment>) -> Result<Option<Resumed>, Error> {
-    let start = header.to_bytes().len() as u64;
+    let start = header.length as u64;
     let (mut entries, mut offset) = (Vec::new(), segments.last().map_or(start, Segment::end));
     let mut next_number = 0;
     if let Some(last) = segments.last().copied() {
@@ -225,7 +221,7 @@ fn last_number(file: &mut File, header: &Header, start: u64, entries: &[Entry]) 
 /// The state from the blocks themselves, which are decoded once for their ranges.
 fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
     file.seek(SeekFrom::Start(0)).map_err(Error::io("read"))?;
-    let mut scanner = Scanner::new(0);
+    let mut scanner = Scanner::default();
     scanner.header(file)?;
     let columns = header.schema.columns.len();
     let (mut offset, mut segment_start) = (scanner.consumed(), scanner.consumed());
@@ -244,7 +240,7 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
         }
         offset = found.offset + found.length as u64;
         match found.kind {
-            Kind::Block => entries.push(match decoded(&header, &scanner, &found, |_| true) {
+            Kind::Block => entries.push(match scanner.decoded(&header, &found, |_| true) {
                 // A block out of its place is not read.
                 Ok(block) if block.number.is_none_or(|number| number >= next_number) => {
                     next_number = block.number.map_or(0, |number| number + 1);
