@@ -71,19 +71,16 @@ pub enum Effort {
     Fast,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Accuracy {
-    Within { delta: f64, period: Option<f64> },
-    Lossless,
-}
-
 /// Largest number of cells of a circle.
 const MOST_CELLS: f64 = (1_u64 << 40) as f64;
 
 /// Writes and reads blocks. Both ends must use the same accuracy; [`Effort`] matters only to the writer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BlockCodec {
-    accuracy: Accuracy,
+    /// The error bound of finite samples; zero if they are exact.
+    delta: f64,
+    /// Circumference of the circle, of a codec with a bound.
+    period: Option<f64>,
     effort: Effort,
 }
 
@@ -98,11 +95,8 @@ impl BlockCodec {
             return Err(ArgumentError::new("bound", bound, "a number whose double is finite").into());
         }
         Ok(Self {
-            accuracy: Accuracy::Within {
-                delta: bound,
-                period: None,
-            },
-            effort: Effort::default(),
+            delta: bound,
+            ..Self::lossless()
         })
     }
 
@@ -113,15 +107,14 @@ impl BlockCodec {
     /// If `period` is not positive and finite, or above `2^40` times the bound.
     pub fn on_circle(self, period: f64) -> Result<Self, Error> {
         ArgumentError::positive("period", period)?;
-        let Accuracy::Within { delta, .. } = self.accuracy else {
+        if self.is_lossless() {
             return Ok(self);
-        };
-        if period / delta > MOST_CELLS {
+        }
+        if period / self.delta > MOST_CELLS {
             return Err(ArgumentError::new("period", period, "at most 2^40 times the bound").into());
         }
-        let period = Some(period);
         Ok(Self {
-            accuracy: Accuracy::Within { delta, period },
+            period: Some(period),
             ..self
         })
     }
@@ -129,7 +122,8 @@ impl BlockCodec {
     /// A codec that returns every sample to the last bit.
     pub fn lossless() -> Self {
         Self {
-            accuracy: Accuracy::Lossless,
+            delta: 0.0,
+            period: None,
             effort: Effort::default(),
         }
     }
@@ -140,12 +134,8 @@ impl BlockCodec {
         Self { effort, ..self }
     }
 
-    /// The error bound of finite samples; zero if they are exact.
-    fn delta(&self) -> f64 {
-        match self.accuracy {
-            Accuracy::Within { delta, .. } => delta,
-            Accuracy::Lossless => 0.0,
-        }
+    fn is_lossless(&self) -> bool {
+        self.delta == 0.0
     }
 }
 
