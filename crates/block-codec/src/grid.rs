@@ -244,18 +244,14 @@ impl Grid {
 
     /// Whether both grids have the same kind and spacing; their origins may differ.
     pub(crate) fn is_like(&self, other: &Self) -> bool {
-        let [own, other] = [self, other].map(|grid| match grid.with_phase(0) {
-            Self::Line { step, .. } => Self::Line {
-                anchor: 0.0,
-                step,
-                phase: 0,
-            },
-            mut grid => {
-                if let Self::Stepped { origin, .. } = &mut grid {
-                    *origin = 0;
-                }
-                grid
+        let [own, other] = [self, other].map(|grid| {
+            let mut grid = grid.with_phase(0);
+            match &mut grid {
+                Self::Line { anchor, .. } => *anchor = 0.0,
+                Self::Stepped { origin, .. } => *origin = 0,
+                _ => {}
             }
+            grid
         });
         own == other
     }
