@@ -3,10 +3,11 @@
 use crate::bytes::{Bytes, unzigzag};
 use crate::error::Damaged;
 use crate::grid::{DECIMALS, Grid, PHASES};
-use crate::head::{CIRCLE, Coding, Head, LINE, SAMPLES, SINGLE, STORED, TABLED, WRAPPED};
+use crate::head::{CIRCLE, CODINGS, CODINGS_OF_SAMPLES, Coding, Head, LINE, SAMPLES, SINGLE, STORED, TABLED, WRAPPED};
 use crate::indices::{from_pco_bytes, from_wrapped_pco, raw_samples, read_block};
 use crate::rows::Others;
-use crate::{Accuracy, BlockCodec, Error, check_rows, learned, levels, stored};
+use crate::sections::SECTIONS;
+use crate::{BlockCodec, Error, check_rows, learned, levels, stored};
 
 impl BlockCodec {
     /// The samples of a block of `rows` rows.
@@ -29,6 +30,14 @@ impl BlockCodec {
                 left => Err(Damaged::new("block", format!("{left} bytes"), "none for no rows").into()),
             };
         }
+        match bytes.strip_prefix(&SECTIONS) {
+            Some(sections) => self.decode_sections(sections, rows),
+            None => self.decode_section(bytes, rows, others),
+        }
+    }
+
+    /// The samples of a block without sections, of at least one row.
+    pub(crate) fn decode_section(&self, bytes: &[u8], rows: usize, others: &[&[f64]]) -> Result<Vec<f64>, Error> {
         let mut bytes = Bytes(bytes);
         let head = self.read_head(&mut bytes, rows)?;
         let rest = bytes.0;
@@ -66,7 +75,13 @@ impl BlockCodec {
     }
 
     /// The grid of samples with `decimals` decimals; its steps are read if `stepped`.
-    pub(crate) fn decimal_grid(&self, decimals: u8, stepped: bool, bytes: &mut Bytes<'_>) -> Result<Grid, Damaged> {
+    pub(crate) fn decimal_grid(
+        &self,
+        decimals: u8,
+        stepped: bool,
+        is_single: bool,
+        bytes: &mut Bytes<'_>,
+    ) -> Result<Grid, Damaged> {
         if stepped {
             return Ok(Grid::Stepped {
                 decimals,
@@ -75,9 +90,10 @@ impl BlockCodec {
                     _ => return Err(Damaged::new("unit", "too large", "1 to 2^63")),
                 },
                 origin: unzigzag(bytes.varint()?),
+                is_single,
             });
         }
-        let width = Grid::width(self.delta(), fewbits_node::adaptive::TENS[usize::from(decimals)]);
+        let width = Grid::width(self.delta, fewbits_node::adaptive::TENS[usize::from(decimals)]);
         let width = width.ok_or_else(|| Damaged::new("decimals", decimals, "a grid not finer than the samples"))?;
         Ok(Grid::Decimal {
             decimals,
@@ -87,38 +103,26 @@ impl BlockCodec {
     }
 
     pub(crate) fn circle(&self) -> Result<Grid, Damaged> {
-        match self.accuracy {
-            Accuracy::Within {
-                delta,
-                period: Some(period),
-            } => Ok(Grid::circle(delta, period)),
-            _ => Err(Damaged::new("grid", "circle", "the grid of a line")),
-        }
+        let circle = self.period.map(|period| Grid::circle(self.delta, period));
+        circle.ok_or_else(|| Damaged::new("grid", "circle", "the grid of a line"))
     }
 
     fn read_head(&self, bytes: &mut Bytes<'_>, rows: usize) -> Result<Head, Damaged> {
         let [head] = bytes.array()?;
         let kind = head & 15;
-        let coding = match (head >> 4 & 3, kind) {
-            (0, 0..SAMPLES) => Coding::Models,
-            (1, _) => Coding::Pco,
-            (2, SAMPLES) => Coding::Raw,
-            (3, SAMPLES) => Coding::Wrapped,
-            (2, _) | (0, SAMPLES) => Coding::Levels,
-            (3, 0..SAMPLES) => Coding::Counts,
-            _ => return Err(Damaged::new("head", head, "a grid and a coding that belong together")),
-        };
         let [second] = if head & 128 == 0 { [0] } else { bytes.array()? };
-        let [is_single, is_wrapped, is_learned, is_stored] =
-            [SINGLE, WRAPPED, TABLED, STORED].map(|flag| second & flag != 0);
-        let is_tabled = is_learned || is_stored;
-        if (is_learned && is_stored)
-            || (head & 128 != 0 && second == 0)
-            || (kind == SAMPLES && head & 128 != 0 && (!matches!(second, TABLED | STORED) || coding != Coding::Levels))
-            || (kind == SAMPLES && head & 64 != 0 && coding != Coding::Levels)
+        let (is_single, is_joint, form) = (second & SINGLE != 0, head & 64 != 0, second & (WRAPPED | TABLED | STORED));
+        let codings: &[(Coding, u8, u8)] = if kind == SAMPLES { &CODINGS_OF_SAMPLES } else { &CODINGS };
+        let found = codings
+            .iter()
+            .find(|(_, bits, own)| (head >> 4 & 3, form) == (*bits, *own));
+        let Some((coding, ..)) = found.copied() else {
+            return Err(Damaged::new("head", format!("{head}, {second}"), "a grid and a coding that belong together"));
+        };
+        if (head & 128 != 0 && second == 0)
+            || (kind == SAMPLES && (second != form || (is_joint && coding != Coding::Levels)))
             || (is_single && (second & 2 == 0 || kind >= DECIMALS))
-            || (is_wrapped && coding != Coding::Pco)
-            || (is_tabled && (head & 64 != 0 || !matches!(coding, Coding::Counts | Coding::Levels)))
+            || (is_joint && form & (TABLED | STORED) != 0)
         {
             return Err(Damaged::new(
                 "second byte",
@@ -126,10 +130,10 @@ impl BlockCodec {
                 "exceptions, steps, an anchor or a phase, and a grid or coding that has them",
             ));
         }
-        let grid = match (kind, self.accuracy) {
-            (SAMPLES, _) => None,
-            (decimals @ 0..DECIMALS, _) => Some(self.decimal_grid(decimals, second & 2 != 0, bytes)?),
-            (LINE, Accuracy::Within { delta, .. }) => {
+        let grid = match kind {
+            SAMPLES => None,
+            0..DECIMALS => Some(self.decimal_grid(kind, second & 2 != 0, is_single, bytes)?),
+            LINE if !self.is_lossless() => {
                 let anchor = if second & 4 == 0 {
                     0.0
                 } else {
@@ -138,20 +142,11 @@ impl BlockCodec {
                 if !anchor.is_finite() {
                     return Err(Damaged::new("anchor", anchor, "a finite number"));
                 }
-                Some(Grid::line(delta, anchor))
+                Some(Grid::line(self.delta, anchor))
             }
-            (CIRCLE, Accuracy::Within { .. }) => Some(self.circle()?),
+            CIRCLE => Some(self.circle()?),
             _ => return Err(Damaged::new("grid", kind, "one of the agreed accuracy")),
         };
-        let coding = match coding {
-            Coding::Pco if is_wrapped => Coding::Wrapped,
-            Coding::Counts if is_stored => Coding::Stored,
-            Coding::Levels if is_stored => Coding::StoredLevels,
-            Coding::Counts if is_tabled => Coding::Tables,
-            Coding::Levels if is_tabled => Coding::TabledLevels,
-            coding => coding,
-        };
-        let grid = grid.map(|grid| if is_single { grid.rounded_to_single() } else { grid });
         let grid = match grid {
             Some(grid) if second & 8 != 0 => Some(read_phase(grid, bytes)?),
             grid => grid,
@@ -171,7 +166,7 @@ impl BlockCodec {
         Ok(Head {
             grid,
             coding,
-            joint: head & 64 != 0,
+            joint: is_joint,
             exceptions,
         })
     }

@@ -6,7 +6,7 @@ use crate::indices::{smallest_pco, write_block};
 use crate::rows::Others;
 use crate::stored::STORED_ROWS;
 use crate::vectors::vectorised;
-use crate::{Accuracy, BlockCodec, Effort, Error, check_rows, levels};
+use crate::{BlockCodec, Effort, Error, check_rows, levels};
 use std::borrow::Cow;
 
 /// Smallest number of rows for which an anchor of eight bytes is stored.
@@ -131,13 +131,10 @@ impl BlockCodec {
     pub(crate) fn grids(&self, samples: &[f64]) -> Vec<Grid> {
         let mut grids: Vec<Grid> = self.grid(samples).into_iter().collect();
         // Directions with few decimals have their own grid, which is better for fine bounds.
-        if let Accuracy::Within {
-            delta,
-            period: Some(period),
-        } = self.accuracy
+        if let Some(period) = self.period
             && samples.iter().all(|x| (0.0..period).contains(x))
         {
-            grids.extend(Grid::decimal(samples, delta));
+            grids.extend(Grid::decimal(samples, self.delta));
         }
         grids.iter().map(|grid| grid.fitted(samples, self.effort)).collect()
     }
@@ -145,14 +142,10 @@ impl BlockCodec {
     /// The grid that fits the samples; `None` if only their own bits do.
     pub(crate) fn grid(&self, samples: &[f64]) -> Option<Grid> {
         let first = samples.iter().copied().find(|x| x.is_finite())?;
-        if let Accuracy::Within {
-            delta,
-            period: Some(period),
-        } = self.accuracy
-        {
-            return Some(Grid::circle(delta, period));
+        if let Some(period) = self.period {
+            return Some(Grid::circle(self.delta, period));
         }
-        let lossless = self.accuracy == Accuracy::Lossless;
+        let lossless = self.is_lossless();
         // Only a lossless block distinguishes the two zeros.
         let is_ordinary = |x: &f64| x.is_finite() & (!lossless | (x.to_bits() != (-0.0_f64).to_bits()));
         let ordinary: Cow<'_, [f64]> = if samples.iter().fold(true, |all, x| all & is_ordinary(x)) {
@@ -160,39 +153,35 @@ impl BlockCodec {
         } else {
             samples.iter().copied().filter(is_ordinary).collect()
         };
-        Grid::decimal(&ordinary, self.delta()).or_else(|| match self.accuracy {
-            Accuracy::Lossless => Grid::single(&ordinary),
-            Accuracy::Within { delta, .. } => {
-                let anchor = if samples.len() >= ANCHORED_ROWS { first } else { 0.0 };
-                Some(Grid::line(delta, anchor))
-            }
+        let anchor = if samples.len() >= ANCHORED_ROWS { first } else { 0.0 };
+        Grid::decimal(&ordinary, self.delta).or_else(|| match lossless {
+            true => Grid::single(&ordinary),
+            false => Some(Grid::line(self.delta, anchor)),
         })
     }
 
     /// Whether a reconstruction is within the bound of its sample.
     #[inline(always)]
     fn is_within(&self, value: f64, sample: f64) -> bool {
-        match self.accuracy {
-            Accuracy::Lossless => value.to_bits() == sample.to_bits(),
-            Accuracy::Within { delta, period } => match period {
-                None => (value - sample).abs() <= delta,
-                Some(period) => {
-                    let turned = sample.rem_euclid(period);
-                    let straight = (value - turned).abs();
-                    (0.0..period).contains(&value) && straight.min((period - straight).abs()) <= delta
-                }
-            },
+        match self.period {
+            None if self.is_lossless() => value.to_bits() == sample.to_bits(),
+            None => (value - sample).abs() <= self.delta,
+            Some(period) => {
+                let turned = sample.rem_euclid(period);
+                let straight = (value - turned).abs();
+                (0.0..period).contains(&value) && straight.min((period - straight).abs()) <= self.delta
+            }
         }
     }
 
     /// The indices (an exception repeats the last one), and the exceptions with their rows.
     pub(crate) fn indices(&self, grid: &Grid, samples: &[f64]) -> (Vec<i64>, Vec<(usize, f64)>) {
-        let plain = match self.accuracy {
-            // Without a circle the loop has no branch and is vectorised.
-            Accuracy::Within { delta, period: None } => {
-                grid.plain_indices(samples, |value, sample| (value - sample).abs() <= delta)
-            }
-            _ => grid.plain_indices(samples, |value, sample| self.is_within(value, sample)),
+        let delta = self.delta;
+        // Without a circle the loop has no branch and is vectorised.
+        let plain = if self.period.is_none() && !self.is_lossless() {
+            grid.plain_indices(samples, |value, sample| (value - sample).abs() <= delta)
+        } else {
+            grid.plain_indices(samples, |value, sample| self.is_within(value, sample))
         };
         if let Some(indices) = plain {
             return (indices, Vec::new());

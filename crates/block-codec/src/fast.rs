@@ -4,6 +4,7 @@ use crate::encode::raw;
 use crate::grid::Grid;
 use crate::head::{Coding, SAMPLES, STORED, write_head};
 use crate::indices::{LEVEL, to_wrapped_pco, write_block};
+use crate::sections::{LEAST_ROWS, sections};
 use crate::stored::{self, Plan};
 use crate::{BlockCodec, Effort, Error, levels};
 use pco::DeltaSpec;
@@ -46,9 +47,33 @@ fn few_levels(keys: impl ExactSizeIterator<Item = u64>) -> Option<(Levels, Plan,
 impl BlockCodec {
     /// As [`encode`](Self::encode), of at least one sample.
     pub(crate) fn encode_fast(&self, samples: &[f64]) -> Result<Vec<u8>, Error> {
+        self.encode_fast_in(samples, true)
+    }
+
+    /// A block without sections.
+    pub(crate) fn encode_section(&self, samples: &[f64]) -> Result<Vec<u8>, Error> {
+        self.encode_fast_in(samples, false)
+    }
+
+    fn encode_fast_in(&self, samples: &[f64], may_have_sections: bool) -> Result<Vec<u8>, Error> {
         let grid = self.grids(samples).into_iter().next();
-        let bytes = match &grid {
-            Some(grid) => self.encode_fast_on(grid, samples)?,
+        let coded = grid.map(|grid| (grid, self.indices(&grid, samples)));
+        if may_have_sections && samples.len() >= LEAST_ROWS {
+            let sections = match &coded {
+                Some((_, (indices, exceptions))) if exceptions.is_empty() => sections(indices),
+                _ => sections(
+                    &samples
+                        .iter()
+                        .map(|sample| levels::key_of_sample(*sample) as i64)
+                        .collect::<Vec<_>>(),
+                ),
+            };
+            if sections.len() > 1 {
+                return self.encode_sections(samples, &sections);
+            }
+        }
+        let bytes = match &coded {
+            Some((grid, (indices, exceptions))) => self.encode_fast_on(grid, samples, indices, exceptions)?,
             None => None,
         };
         let bytes = match bytes {
@@ -82,13 +107,18 @@ impl BlockCodec {
     }
 
     /// The block on a grid; `None` if samples without one are shorter.
-    fn encode_fast_on(&self, grid: &Grid, samples: &[f64]) -> Result<Option<Vec<u8>>, Error> {
-        let (indices, exceptions) = self.indices(grid, samples);
+    fn encode_fast_on(
+        &self,
+        grid: &Grid,
+        samples: &[f64],
+        indices: &[i64],
+        exceptions: &[(usize, f64)],
+    ) -> Result<Option<Vec<u8>>, Error> {
         let is_tabled = self.is_tabled(samples.len());
         let plan = if is_tabled {
-            Plan::new(&indices)
+            Plan::new(indices)
         } else {
-            Plan::of_differences(&indices)
+            Plan::of_differences(indices)
         };
         let (plain, mut least, mut choice) = (plan.bits, plan.bits, Choice::Symbols(plan));
         if plain > FINE_FOR_LEVELS {
@@ -98,7 +128,7 @@ impl BlockCodec {
             }
         }
         if plain > FINE as f32 {
-            let (order, bits) = stored::pco_order(&indices);
+            let (order, bits) = stored::pco_order(indices);
             if bits < least {
                 (least, choice) = (bits, Choice::Pco(order));
             }
@@ -109,13 +139,13 @@ impl BlockCodec {
         }
         let head = |coding| {
             let mut bytes = Vec::new();
-            write_head(grid, coding, false, &exceptions, &mut bytes);
+            write_head(grid, coding, false, exceptions, &mut bytes);
             bytes
         };
-        let counted = || write_block(false, grid, &indices, &exceptions, None);
+        let counted = || write_block(false, grid, indices, exceptions, None);
         Ok(Some(match choice {
             Choice::Symbols(plan) if is_tabled => {
-                let bytes = stored::write(&indices, &plan, head(Coding::Stored))?;
+                let bytes = stored::write(indices, &plan, head(Coding::Stored))?;
                 let bits = 8.0 * bytes.len() as f32 / samples.len() as f32;
                 let other = if bits <= SPARSE { Some(counted()?) } else { None };
                 other.filter(|other| other.len() < bytes.len()).unwrap_or(bytes)
@@ -127,7 +157,7 @@ impl BlockCodec {
             Choice::Levels(found, _) => levels::write(head(Coding::Levels), false, &found, None)?,
             Choice::Pco(order) => {
                 let mut bytes = head(Coding::Wrapped);
-                match to_wrapped_pco(&indices, &DeltaSpec::TryConsecutive(order), LEVEL)? {
+                match to_wrapped_pco(indices, &DeltaSpec::TryConsecutive(order), LEVEL)? {
                     Some(numbers) => bytes.extend(numbers),
                     None => bytes = counted()?,
                 }

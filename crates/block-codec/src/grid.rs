@@ -31,10 +31,13 @@ pub(crate) enum Grid {
     /// Samples are integer multiples of `10^-decimals`. A cell has `width` neighbouring multiples, as many as lie within the bound of its
     /// middle. The first of them is `phase` sixteenths of the width, rounded up, from a multiple of the width.
     Decimal { decimals: u8, width: i64, phase: u8 },
-    /// Samples are exactly `(origin + unit j) / 10^decimals`.
-    Stepped { decimals: u8, unit: i64, origin: i64 },
-    /// As [`Stepped`](Self::Stepped), rounded to single precision.
-    Single { decimals: u8, unit: i64, origin: i64 },
+    /// Samples are exactly `(origin + unit j) / 10^decimals`, or that rounded to single precision.
+    Stepped {
+        decimals: u8,
+        unit: i64,
+        origin: i64,
+        is_single: bool,
+    },
     /// `anchor + step (j + phase / 16)`.
     Line { anchor: f64, step: f64, phase: u8 },
     /// `cells` equal cells on a circle.
@@ -117,7 +120,12 @@ impl Grid {
         Some(if unit <= 1 {
             plain
         } else {
-            Self::Stepped { decimals, unit, origin }
+            Self::Stepped {
+                decimals,
+                unit,
+                origin,
+                is_single: false,
+            }
         })
     }
 
@@ -131,15 +139,12 @@ impl Grid {
         let mut all = samples.iter().filter_map(|x| single_digits(*x, ten));
         let origin = all.next()?;
         let unit = common_unit(all.map(|digits| digits - origin)).max(1);
-        Some(Self::Single { decimals, unit, origin })
-    }
-
-    /// The same grid of samples of single precision, if it has steps.
-    pub(crate) fn rounded_to_single(self) -> Self {
-        match self {
-            Self::Stepped { decimals, unit, origin } => Self::Single { decimals, unit, origin },
-            grid => grid,
-        }
+        Some(Self::Stepped {
+            decimals,
+            unit,
+            origin,
+            is_single: true,
+        })
     }
 
     /// Number of neighbouring multiples of `1 / ten` within `delta` of their middle; `None` if it is too large.
@@ -239,22 +244,16 @@ impl Grid {
 
     /// Whether both grids have the same kind and spacing; their origins may differ.
     pub(crate) fn is_like(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Line { .. }, Self::Line { .. }) => true,
-            (
-                Self::Stepped { decimals, unit, .. },
-                Self::Stepped {
-                    decimals: d, unit: u, ..
-                },
-            ) => (decimals, unit) == (d, u),
-            (
-                Self::Single { decimals, unit, .. },
-                Self::Single {
-                    decimals: d, unit: u, ..
-                },
-            ) => (decimals, unit) == (d, u),
-            _ => self.with_phase(0) == other.with_phase(0),
-        }
+        let [own, other] = [self, other].map(|grid| {
+            let mut grid = grid.with_phase(0);
+            match &mut grid {
+                Self::Line { anchor, .. } => *anchor = 0.0,
+                Self::Stepped { origin, .. } => *origin = 0,
+                _ => {}
+            }
+            grid
+        });
+        own == other
     }
 
     /// Number of points on the circle; `None` for other grids.
@@ -281,13 +280,19 @@ impl Grid {
                 };
                 0.5 * twice / TENS[usize::from(*decimals)]
             }
-            Self::Stepped { decimals, unit, origin } => {
-                (i128::from(*origin) + i128::from(*unit) * i128::from(index)) as f64 / TENS[usize::from(*decimals)]
-            }
-            Self::Single { decimals, unit, origin } => {
+            Self::Stepped {
+                decimals,
+                unit,
+                origin,
+                is_single,
+            } => {
                 let digits = (i128::from(*origin) + i128::from(*unit) * i128::from(index)) as f64;
-                let rounded = f64::from((digits / TENS[usize::from(*decimals)]) as f32);
-                rounded.clamp(f64::MIN, f64::MAX)
+                let value = digits / TENS[usize::from(*decimals)];
+                if *is_single {
+                    f64::from(value as f32).clamp(f64::MIN, f64::MAX)
+                } else {
+                    value
+                }
             }
             Self::Line { anchor, step, phase } => {
                 (anchor + step * (index as f64 + f64::from(*phase) / f64::from(PHASES))).clamp(f64::MIN, f64::MAX)
@@ -346,10 +351,14 @@ impl Grid {
                     .then_some(digits as i64)
                     .map(|digits| (digits - Self::digits_moved(*width, *phase)).div_euclid(*width))
             }
-            Self::Stepped { decimals, unit, origin } | Self::Single { decimals, unit, origin } => {
+            Self::Stepped {
+                decimals,
+                unit,
+                origin,
+                is_single,
+            } => {
                 let ten = TENS[usize::from(*decimals)];
-                let is_single = matches!(self, Self::Single { .. });
-                let digits = if is_single {
+                let digits = if *is_single {
                     single_digits(sample, ten)
                 } else {
                     digits(sample, ten)
@@ -376,7 +385,7 @@ impl Grid {
     /// Writes what the reader needs besides the configuration.
     pub(crate) fn write(&self, bytes: &mut Vec<u8>) {
         match self {
-            Self::Stepped { unit, origin, .. } | Self::Single { unit, origin, .. } => {
+            Self::Stepped { unit, origin, .. } => {
                 push_varint(bytes, *unit as u64);
                 push_varint(bytes, zigzag(*origin));
             }

@@ -36,6 +36,29 @@ pub(crate) enum Coding {
     Wrapped,
 }
 
+/// Of each coding of indices its bits in the first byte, and its flag in the second one.
+pub(crate) const CODINGS: [(Coding, u8, u8); 9] = [
+    (Coding::Models, 0, 0),
+    (Coding::Pco, 1, 0),
+    (Coding::Wrapped, 1, WRAPPED),
+    (Coding::Levels, 2, 0),
+    (Coding::TabledLevels, 2, TABLED),
+    (Coding::StoredLevels, 2, STORED),
+    (Coding::Counts, 3, 0),
+    (Coding::Tables, 3, TABLED),
+    (Coding::Stored, 3, STORED),
+];
+
+/// The same of samples.
+pub(crate) const CODINGS_OF_SAMPLES: [(Coding, u8, u8); 6] = [
+    (Coding::Levels, 0, 0),
+    (Coding::TabledLevels, 0, TABLED),
+    (Coding::StoredLevels, 0, STORED),
+    (Coding::Pco, 1, 0),
+    (Coding::Raw, 2, 0),
+    (Coding::Wrapped, 3, 0),
+];
+
 /// The head as it was read.
 pub(crate) struct Head {
     pub(crate) grid: Option<Grid>,
@@ -47,22 +70,14 @@ pub(crate) struct Head {
 pub(crate) fn write_head(grid: &Grid, coding: Coding, joint: bool, exceptions: &[(usize, f64)], bytes: &mut Vec<u8>) {
     let (kind, own) = match grid {
         Grid::Decimal { decimals, .. } => (*decimals, 0),
-        Grid::Stepped { decimals, .. } => (*decimals, 2),
-        Grid::Single { decimals, .. } => (*decimals, 2 | SINGLE),
+        Grid::Stepped {
+            decimals, is_single, ..
+        } => (*decimals, 2 | if *is_single { SINGLE } else { 0 }),
         Grid::Line { anchor, .. } => (LINE, if *anchor == 0.0 { 0 } else { 4 }),
         Grid::Circle { .. } => (CIRCLE, 0),
     };
-    let (coding, form) = match coding {
-        Coding::Models => (0, 0),
-        Coding::Pco => (1, 0),
-        Coding::Wrapped => (1, WRAPPED),
-        Coding::Raw | Coding::Levels => (2, 0),
-        Coding::Counts => (3, 0),
-        Coding::Tables => (3, TABLED),
-        Coding::TabledLevels => (2, TABLED),
-        Coding::Stored => (3, STORED),
-        Coding::StoredLevels => (2, STORED),
-    };
+    let written = CODINGS.iter().find(|(own, ..)| *own == coding);
+    let (coding, form) = written.map_or((0, 0), |(_, bits, form)| (*bits, *form));
     let moved = if grid.phase() == 0 { 0 } else { 8 };
     let second = own | moved | form | u8::from(!exceptions.is_empty());
     bytes.push(kind | coding << 4 | u8::from(joint) << 6 | u8::from(second != 0) << 7);

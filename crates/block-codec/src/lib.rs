@@ -25,6 +25,7 @@
 //! | anchor | 8 | a point of the line, little-endian; otherwise zero is one |
 //! | phase | 1 | the grid of a line, or of cells of several decimals, is moved by so many sixteenths of a cell (1 to 15; whole decimals, rounded up) |
 //! | exceptions | varints and 8 each | number; rows since the last one; the sample |
+//! | sections | the rest | in place of all others behind the bytes 8f c0, module `sections`: rows whose kind changes, written with [`Effort::Fast`] |
 //! | indices | the rest | models: 6 bits length (48 more if contexts have the lengths of rests: of blocks of 1024 rows or more, where the length is below 16) and as many bits of the first index (zigzag), then decisions (`model.rs`), all arithmetic coded; counts: the same with a bit behind the first index (1: differences of differences) and other decisions (`counts.rs`); tables: module `stored`, or `learned`; levels: module `levels`; pco: its standalone or, as written since version 6 of recordings, its wrapped format with one chunk and one page |
 //!
 //! There is no checksum, no length and no number of rows: the container must store all three. An arithmetic code has no redundancy, so most
@@ -49,6 +50,7 @@ mod model;
 mod plain;
 mod priors;
 mod rows;
+mod sections;
 mod start;
 mod stored;
 mod vectors;
@@ -69,19 +71,16 @@ pub enum Effort {
     Fast,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Accuracy {
-    Within { delta: f64, period: Option<f64> },
-    Lossless,
-}
-
 /// Largest number of cells of a circle.
 const MOST_CELLS: f64 = (1_u64 << 40) as f64;
 
 /// Writes and reads blocks. Both ends must use the same accuracy; [`Effort`] matters only to the writer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BlockCodec {
-    accuracy: Accuracy,
+    /// The error bound of finite samples; zero if they are exact.
+    delta: f64,
+    /// Circumference of the circle, of a codec with a bound.
+    period: Option<f64>,
     effort: Effort,
 }
 
@@ -96,11 +95,8 @@ impl BlockCodec {
             return Err(ArgumentError::new("bound", bound, "a number whose double is finite").into());
         }
         Ok(Self {
-            accuracy: Accuracy::Within {
-                delta: bound,
-                period: None,
-            },
-            effort: Effort::default(),
+            delta: bound,
+            ..Self::lossless()
         })
     }
 
@@ -111,15 +107,14 @@ impl BlockCodec {
     /// If `period` is not positive and finite, or above `2^40` times the bound.
     pub fn on_circle(self, period: f64) -> Result<Self, Error> {
         ArgumentError::positive("period", period)?;
-        let Accuracy::Within { delta, .. } = self.accuracy else {
+        if self.is_lossless() {
             return Ok(self);
-        };
-        if period / delta > MOST_CELLS {
+        }
+        if period / self.delta > MOST_CELLS {
             return Err(ArgumentError::new("period", period, "at most 2^40 times the bound").into());
         }
-        let period = Some(period);
         Ok(Self {
-            accuracy: Accuracy::Within { delta, period },
+            period: Some(period),
             ..self
         })
     }
@@ -127,7 +122,8 @@ impl BlockCodec {
     /// A codec that returns every sample to the last bit.
     pub fn lossless() -> Self {
         Self {
-            accuracy: Accuracy::Lossless,
+            delta: 0.0,
+            period: None,
             effort: Effort::default(),
         }
     }
@@ -138,12 +134,8 @@ impl BlockCodec {
         Self { effort, ..self }
     }
 
-    /// The error bound of finite samples; zero if they are exact.
-    fn delta(&self) -> f64 {
-        match self.accuracy {
-            Accuracy::Within { delta, .. } => delta,
-            Accuracy::Lossless => 0.0,
-        }
+    fn is_lossless(&self) -> bool {
+        self.delta == 0.0
     }
 }
 

@@ -20,7 +20,7 @@ use crate::grid::{DECIMALS, Grid};
 use crate::head::{CIRCLE, LINE};
 use crate::indices::{RESTS_ROWS, Rest, code_rest};
 use crate::rows::{LARGEST, Others};
-use crate::{Accuracy, BlockCodec, Effort, Error, check_rows};
+use crate::{BlockCodec, Effort, Error, check_rows};
 
 /// Probabilities, in units of `2^-16`, that a block uses the start, and that it is coded by models.
 const WITH_START: u32 = 65_280;
@@ -72,8 +72,9 @@ impl Start {
                 | rests
                 | match self.grid {
                     Grid::Decimal { decimals, .. } => decimals,
-                    Grid::Stepped { decimals, .. } => decimals | STEPPED,
-                    Grid::Single { decimals, .. } => decimals | STEPPED | SINGLE,
+                    Grid::Stepped {
+                        decimals, is_single, ..
+                    } => decimals | STEPPED | if is_single { SINGLE } else { 0 },
                     Grid::Line { .. } => LINE,
                     Grid::Circle { .. } => CIRCLE,
                 },
@@ -149,14 +150,14 @@ impl BlockCodec {
         let [head] = reader.array()?;
         let kind = head & !(MOVED | SINGLE | RESTS);
         let is_single = head & SINGLE != 0;
-        let mut grid = match (kind & !STEPPED, self.accuracy) {
-            (0..DECIMALS, _) if !is_single || kind & STEPPED != 0 => {
-                let grid = self.decimal_grid(kind & !STEPPED, kind & STEPPED != 0, &mut reader)?;
-                if is_single { grid.rounded_to_single() } else { grid }
+        let (decimals, stepped) = (kind & !STEPPED, kind & STEPPED != 0);
+        let mut grid = match kind {
+            _ if decimals < DECIMALS && (stepped || !is_single) => {
+                self.decimal_grid(decimals, stepped, is_single, &mut reader)?
             }
             _ if is_single => return Err(Damaged::new("grid", kind, "decimals with steps").into()),
-            (LINE, Accuracy::Within { delta, .. }) if kind == LINE => Grid::line(delta, 0.0),
-            (CIRCLE, Accuracy::Within { .. }) if kind == CIRCLE => self.circle()?,
+            LINE if !self.is_lossless() => Grid::line(self.delta, 0.0),
+            CIRCLE => self.circle()?,
             _ => return Err(Damaged::new("grid", kind, "one of the agreed accuracy").into()),
         };
         if head & MOVED != 0 {

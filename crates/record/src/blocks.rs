@@ -5,7 +5,7 @@ use crate::block::{self, Block};
 use crate::error::{Damage, Error};
 use crate::index::{Entry, Segment};
 use crate::playback::{Index, Playback, Row, entries, read_at};
-use crate::scan::{Found, Kind, Order, Scanner, damage_of, decoded};
+use crate::scan::{Order, Scanner, no_bytes};
 use std::collections::VecDeque;
 use std::io::{Read, Seek, SeekFrom};
 
@@ -45,11 +45,8 @@ pub struct Blocks<'a, R> {
     /// The bytes without index that are scanned at present, and the offset of their end.
     scan: Option<(Scanner, u64)>,
     scanned: bool,
-    /// The order of scanned blocks, and the number of the last indexed one.
-    order: Order,
+    /// The number of the last indexed block.
     last_number: Option<u64>,
-    /// What is returned next.
-    pending: VecDeque<Result<Block, Error>>,
     /// Whether the only block is still to be read.
     single: bool,
 }
@@ -63,20 +60,10 @@ impl<'a, R> Blocks<'a, R> {
             entries: VecDeque::new(),
             scan: None,
             scanned: false,
-            order: Order::default(),
             last_number: None,
-            pending: VecDeque::new(),
             single: playback.single.is_some(),
             playback,
         }
-    }
-}
-
-fn no_bytes(offset: u64, damage: Damage) -> Error {
-    Error::Block {
-        offset,
-        bytes: 0,
-        damage,
     }
 }
 
@@ -90,7 +77,7 @@ impl<R: Read + Seek> Blocks<'_, R> {
     /// # Errors
     /// If reading fails.
     pub(crate) fn known(&mut self, is_wanted: impl Fn((i64, i64)) -> bool) -> Result<Option<Known>, Error> {
-        if !self.pending.is_empty() || self.scan.is_some() || self.single {
+        if self.scan.is_some() || self.single {
             return Ok(None);
         }
         while self.entries.is_empty() {
@@ -180,55 +167,30 @@ impl<R: Read + Seek> Blocks<'_, R> {
     /// The next block of the stretch without index that is scanned; `None` at its end.
     fn scanned(&mut self) -> Option<Result<Block, Error>> {
         let (scanner, end) = self.scan.as_mut()?;
-        let (end, header) = (*end, &self.playback.header);
-        loop {
-            let mut reader = (&mut self.playback.reader).take(end.saturating_sub(scanner.read_to()));
-            let found: Found = match scanner.next(&mut reader, header) {
-                Ok(Some(found)) => found,
-                Ok(None) => {
-                    self.scan = None;
-                    return None;
-                }
-                Err(error) => {
-                    if !matches!(error, Error::Block { .. }) {
-                        self.scan = None;
-                    }
-                    return Some(Err(error));
-                }
-            };
-            if found.kind != Kind::Block {
-                continue;
-            }
-            let chosen = &self.playback.chosen;
-            let block = decoded(header, scanner, &found, |column| chosen.contains(&column));
-            let damage = block.as_ref().ok().and_then(|block| self.order.judge(block.number));
-            let Some(damage) = damage else { return Some(block) };
-            if damage == Damage::Missing {
-                self.pending.push_back(block);
-            }
-            return Some(Err(damage_of(&found, damage)));
+        let Playback {
+            reader, header, chosen, ..
+        } = &mut *self.playback;
+        let mut reader = reader.take(end.saturating_sub(scanner.read_to()));
+        let next = scanner.next_block(&mut reader, header, |column| chosen.contains(&column));
+        if !matches!(next, Some(Ok(_) | Err(Error::Block { .. }))) {
+            self.scan = None;
         }
+        next
     }
 
     /// Begins to scan a stretch. What is said of missing blocks refers to those after the first one found.
     fn start_scan(&mut self, (start, end): (u64, u64), order: Order) -> Result<(), Error> {
         let sought = self.playback.reader.seek(SeekFrom::Start(start));
         sought.map_err(Error::io("read"))?;
-        self.scan = Some((Scanner::new(start), end));
-        self.order = order;
+        self.scan = Some((Scanner::new(start, order), end));
         Ok(())
     }
 
     /// The only block of a recording.
     fn only(&self) -> Result<Block, Error> {
-        let chosen = &self.playback.chosen;
         let content = self.playback.single.as_deref().unwrap_or_default();
-        let block = block::decode_content(&self.playback.header, content, |column| chosen.contains(&column));
-        block.map_err(|damage| Error::Block {
-            offset: 0,
-            bytes: self.playback.span.1,
-            damage,
-        })
+        self.playback
+            .only(content, |column| self.playback.chosen.contains(&column))
     }
 }
 
@@ -240,9 +202,6 @@ impl<R: Read + Seek> Iterator for Blocks<'_, R> {
             return Some(self.only());
         }
         loop {
-            if let Some(next) = self.pending.pop_front() {
-                return Some(next);
-            }
             if self.scan.is_some() {
                 match self.scanned() {
                     Some(block) => return Some(block),

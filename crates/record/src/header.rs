@@ -53,6 +53,8 @@ pub(crate) struct Header {
     pub(crate) share_bounds: Vec<f64>,
     /// The start of each column, for blocks that do not state their own bound.
     pub(crate) starts: Vec<Option<Start>>,
+    /// Its length in bytes.
+    pub(crate) length: usize,
     /// The header's checksum. The checksums of all blocks include it, so a block of another recording is refused.
     pub(crate) check: u32,
 }
@@ -84,6 +86,7 @@ impl Header {
             origin: grid.origin,
             step: grid.step,
             share_bounds: share_bounds.into_iter().map(rounded_down).collect(),
+            length: 0,
             check: 0,
         };
         header.checked()
@@ -144,6 +147,7 @@ impl Header {
 
     fn checked(mut self) -> Self {
         let bytes = self.to_bytes();
+        self.length = bytes.len();
         self.check = match self.form {
             Form::Single => 0,
             _ => bytes.last_chunk::<4>().map_or(0, |check| u32::from_le_bytes(*check)),
@@ -182,27 +186,19 @@ impl Header {
         }
     }
 
-    /// The encoded header: magic bytes, version, length, identity, content, checksum. That of a single block has neither length nor
+    /// The encoded header, of this version: magic bytes, version, length, identity, content, checksum. That of a single block has neither length nor
     /// identity nor checksum.
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
         let body = self.body();
         let mut bytes = MAGIC.to_vec();
-        match (self.version, self.form) {
-            (VERSION_5, _) => {
-                bytes.extend(MAGIC_5);
-                push_varint(&mut bytes, body.len() as u64);
-            }
-            (_, Form::Single) => {
-                bytes.push(VERSION | SINGLE);
-                bytes.extend(body);
-                return bytes;
-            }
-            _ => {
-                bytes.push(VERSION);
-                push_varint(&mut bytes, body.len() as u64);
-                bytes.extend(self.identity.to_le_bytes());
-            }
+        if self.form == Form::Single {
+            bytes.push(VERSION | SINGLE);
+            bytes.extend(body);
+            return bytes;
         }
+        bytes.push(VERSION);
+        push_varint(&mut bytes, body.len() as u64);
+        bytes.extend(self.identity.to_le_bytes());
         bytes.extend(body);
         let check = checksum(&[&bytes]);
         bytes.extend(check.to_le_bytes());
@@ -223,9 +219,7 @@ impl Header {
             }
             None => push_varint(&mut body, rows_per_block as u64),
         }
-        // In version 5 all of them follow.
-        let is_old = self.version == VERSION_5;
-        let flag = |given: bool, flag: u8| if given && !is_old { flag } else { 0 };
+        let flag = |given: bool, flag: u8| if given { flag } else { 0 };
         let count = self.schema.columns.len();
         let flags = flag(self.form == Form::Stream, STREAM)
             | flag(self.origin != 0, ORIGIN)
@@ -250,18 +244,18 @@ impl Header {
                 }
             }
         }
-        if is_old || self.origin != 0 {
+        if self.origin != 0 {
             push_varint(&mut body, zigzag(self.origin));
         }
-        if is_old || self.schema.time != TimeBase::Numbered {
+        if self.schema.time != TimeBase::Numbered {
             push_varint(&mut body, zigzag(self.step));
         }
-        if is_old || count > 1 {
+        if count > 1 {
             push_varint(&mut body, count as u64);
         }
         let columns = self.schema.columns.iter().zip(&self.share_bounds).zip(&self.starts);
         for ((column, share_bound), start) in columns {
-            push_column(&mut body, self.version, column, *share_bound, start.as_ref());
+            push_column(&mut body, column, *share_bound, start.as_ref());
         }
         body
     }

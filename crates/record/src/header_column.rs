@@ -5,7 +5,7 @@ use crate::codec::{Target, adaptive};
 use crate::column::Column;
 use crate::error::{Damage, Error};
 use crate::integers::Integers;
-use crate::wire::{Bytes, VERSION_5, push_text, push_varint, text, unzigzag, zigzag};
+use crate::wire::{Bytes, push_text, push_varint, text, unzigzag, zigzag};
 use fewbits_block_codec::Start;
 use std::f64::consts::TAU;
 
@@ -46,14 +46,13 @@ pub(crate) fn shortened(bound: f64) -> f64 {
 }
 
 /// Appends a non-negative number: decimals and digits if these are exact, otherwise its bits.
-fn push_number(body: &mut Vec<u8>, number: f64, version: u8) {
+fn push_number(body: &mut Vec<u8>, number: f64) {
     match digits(number) {
         Some((decimals, digits)) => {
             body.push(decimals);
             push_varint(body, digits);
         }
-        // The header of version 5 is written again to find its length.
-        None if number == TAU && version != VERSION_5 => body.push(TURN),
+        None if number == TAU => body.push(TURN),
         None => {
             body.push(DOUBLE);
             body.extend(number.to_le_bytes());
@@ -74,7 +73,7 @@ fn read_number(body: &mut Bytes<'_>) -> Result<f64, Damage> {
     }
 }
 
-pub(crate) fn push_column(body: &mut Vec<u8>, version: u8, column: &Column, share_bound: f64, start: Option<&Start>) {
+pub(crate) fn push_column(body: &mut Vec<u8>, column: &Column, share_bound: f64, start: Option<&Start>) {
     push_text(body, &column.name);
     let flag = |given: bool, flag: u8| if given { flag } else { 0 };
     let flags = flag(column.period.is_some(), HAS_PERIOD)
@@ -91,11 +90,11 @@ pub(crate) fn push_column(body: &mut Vec<u8>, version: u8, column: &Column, shar
         },
         Bound::Absolute(delta) => {
             body.push(1 | flags);
-            push_number(body, delta, version);
+            push_number(body, delta);
         }
         Bound::ShareOfRange(share) => {
             body.push(2 | flags);
-            push_number(body, share, version);
+            push_number(body, share);
             body.extend_from_slice(&share_bound.to_be_bytes()[..3]);
         }
         Bound::Decimals(places) => {
@@ -104,18 +103,18 @@ pub(crate) fn push_column(body: &mut Vec<u8>, version: u8, column: &Column, shar
         }
         Bound::Relative { share, floor } => {
             body.push(4 | flags);
-            push_number(body, share, version);
-            push_number(body, floor, version);
+            push_number(body, share);
+            push_number(body, floor);
         }
     }
     if !column.unit.is_empty() {
         push_text(body, &column.unit);
     }
     if let Some(period) = column.period {
-        push_number(body, period, version);
+        push_number(body, period);
     }
     if column.earlier > 0.0 {
-        push_number(body, column.earlier, version);
+        push_number(body, column.earlier);
     }
     if let Some(start) = start {
         body.extend(start.to_bytes());

@@ -12,7 +12,7 @@ use fewbits_block_codec::bytes::Unread;
 use std::ops::Range;
 
 impl Header {
-    /// Reads a header from the front of `bytes`, with its length.
+    /// Reads a header from the front of `bytes`.
     ///
     /// # Errors
     /// If the bytes are no header.
@@ -71,8 +71,9 @@ impl Header {
         let mut header = Self::read_body(&mut body, length, check)?;
         body.finish().map_err(Error::header)?;
         (header.version, header.identity) = (version, u32::from_le_bytes(identity));
+        header.length = end + CHECK_BYTES;
         // Streams of version 5 are not marked.
-        Ok(Known::Header(Box::new(header), end + CHECK_BYTES))
+        Ok(Known::Header(Box::new(header)))
     }
 
     /// Reads a whole recording of a single block: its header, and where the block's content stands.
@@ -183,6 +184,7 @@ impl Header {
             step,
             share_bounds,
             starts,
+            length: 0,
             check,
         })
     }
@@ -200,8 +202,8 @@ enum Length {
 
 /// What the first bytes of a recording are.
 pub(crate) enum Known {
-    /// A header, with its length.
-    Header(Box<Header>, usize),
+    /// A header.
+    Header(Box<Header>),
     /// The beginning of a recording of a single block.
     Single,
     /// Too few bytes.

@@ -2,7 +2,7 @@
 
 use crate::aggregate::Aggregate;
 use crate::append;
-use crate::block;
+use crate::block::{self, Block};
 use crate::error::{Damage, Error};
 use crate::header::Header;
 use crate::index::{self, END, Entry, Segment, TRAILER_BYTES};
@@ -39,6 +39,19 @@ pub struct BlockInfo {
     pub ends: Vec<Option<(f64, f64)>>,
     /// Aggregates of each column. The index has them if blocks have 4096 rows or more; then [`ends`](Self::ends) are exact.
     pub aggregates: Option<Vec<Aggregate>>,
+}
+
+impl BlockInfo {
+    fn of(entry: Entry, offset: u64) -> Self {
+        Self {
+            offset,
+            bytes: entry.length,
+            rows: entry.rows,
+            ticks: entry.ticks,
+            ends: entry.ends,
+            aggregates: entry.aggregates,
+        }
+    }
 }
 
 /// Reads a recording by its index, or from front to end if it has none.
@@ -102,7 +115,7 @@ impl<R: Read + Seek> Playback<R> {
     /// If reading fails or the header is incomplete or damaged. Damage after the header is reported later.
     pub fn new(mut reader: R) -> Result<Self, Error> {
         reader.seek(SeekFrom::Start(0)).map_err(Error::io("read"))?;
-        let mut scanner = Scanner::new(0);
+        let mut scanner = Scanner::default();
         let (header, single) = scanner.header(&mut reader)?;
         let start = scanner.consumed();
         let index = match single {
@@ -144,11 +157,7 @@ impl<R: Read + Seek> Playback<R> {
             Some(ends.map_or((first, last), |(low, high)| (low.min(first), high.max(last))))
         };
         if let Some(content) = &self.single {
-            let block = block::decode_content(&self.header, content, |_| false).map_err(|damage| Error::Block {
-                offset: 0,
-                bytes: self.span.1,
-                damage,
-            })?;
+            let block = self.only(content, |_| false)?;
             return Ok(block.ticks.iter().map(|tick| (*tick, *tick)).fold(None, widened));
         }
         let Index::Whole(segments) = &self.index else {
@@ -156,6 +165,11 @@ impl<R: Read + Seek> Playback<R> {
         };
         let filled = segments.iter().filter(|segment| segment.rows > 0);
         Ok(filled.map(|segment| segment.ticks).fold(None, widened))
+    }
+
+    /// The only block, with this content.
+    pub(crate) fn only(&self, content: &[u8], wanted: impl Fn(usize) -> bool) -> Result<Block, Error> {
+        block::only(&self.header, content, self.span.1, wanted)
     }
 
     /// Length of the whole recording in bytes.
@@ -183,21 +197,10 @@ impl<R: Read + Seek> Playback<R> {
         let mut infos = Vec::new();
         if let Some(content) = &self.single {
             let length = content.len() as u64;
-            let block = block::decode_content(&self.header, content, |_| true).map_err(|damage| Error::Block {
-                offset: 0,
-                bytes: self.span.1,
-                damage,
-            })?;
+            let block = self.only(content, |_| true)?;
             let entry = Entry::of(length, &block.ticks, &block.columns);
-            infos.push(BlockInfo {
-                // The checksum of the whole recording follows the content.
-                offset: self.span.1.saturating_sub(length + 4),
-                bytes: length,
-                rows: entry.rows,
-                ticks: entry.ticks,
-                ends: entry.ends,
-                aggregates: entry.aggregates,
-            });
+            // The checksum of the whole recording follows the content.
+            infos.push(BlockInfo::of(entry, self.span.1.saturating_sub(length + 4)));
         }
         let Index::Whole(segments) = self.index.clone() else {
             return Ok(infos);
@@ -212,15 +215,9 @@ impl<R: Read + Seek> Playback<R> {
             };
             let mut offset = segment.start;
             for entry in found {
-                infos.push(BlockInfo {
-                    offset,
-                    bytes: entry.length,
-                    rows: entry.rows,
-                    ticks: entry.ticks,
-                    ends: entry.ends,
-                    aggregates: entry.aggregates,
-                });
-                offset = offset.saturating_add(infos.last().map_or(0, |info| info.bytes));
+                let next = offset.saturating_add(entry.length);
+                infos.push(BlockInfo::of(entry, offset));
+                offset = next;
             }
         }
         Ok(infos)
@@ -262,7 +259,7 @@ pub(crate) fn index_of(reader: &mut (impl Read + Seek), header: &Header) -> Resu
     let Some(bytes) = read_at(reader, start, length)? else {
         return Ok(without);
     };
-    let first = header.to_bytes().len() as u64;
+    let first = header.length as u64;
     let (found, expected) = match index::read_special(header, &bytes) {
         Ok((index::FOOTER, content, whole)) if whole as u64 == length => {
             (index::read_footer(header, content, first), start)

@@ -1,13 +1,15 @@
 //! Writing of recordings.
 
 use crate::append::{self, Append};
-use crate::block;
-use crate::error::Error;
-use crate::header::Header;
+use crate::block::{self, Block};
+use crate::error::{Damage, Error};
+use crate::header::{Form, Header};
 use crate::index::{self, BLOCKS_PER_SEGMENT, Entry, Segment};
-use crate::resume;
+use crate::resume::{self, Opened};
+use crate::scan::{Kind, Scanner};
 use crate::schema::Schema;
 use crate::waiting::Waiting;
+use crate::wire::checked;
 use fewbits_block_codec::Effort;
 use std::fs::File;
 use std::io::Write;
@@ -75,9 +77,13 @@ impl Recorder<File> {
     /// # Errors
     /// If the file cannot be opened or read, its header is incomplete or damaged, or another program writes to it.
     pub fn resume(path: impl AsRef<Path>) -> Result<Self, Error> {
-        let (file, append, resumed) = resume::open(path.as_ref())?;
+        let path = path.as_ref();
+        let (file, append, resumed) = match resume::open(path)? {
+            Opened::InPlace(file, append, resumed) => (file, append, *resumed),
+            Opened::Other(file, header, single, scanner) => return Self::copied(file, path, &header, single, scanner),
+        };
         let schema = resumed.header.schema.clone();
-        let first = resumed.header.to_bytes().len() as u64;
+        let first = resumed.header.length as u64;
         Ok(Self {
             header: Some(resumed.header),
             next_tick: resumed.next_tick,
@@ -89,6 +95,37 @@ impl Recorder<File> {
             append,
             ..Self::new(file, schema)
         })
+    }
+
+    /// Continues a copy with a header of this version that goes on. Its blocks keep their bytes but for the first numbers.
+    fn copied(
+        locked: File,
+        path: &Path,
+        old: &Header,
+        single: Option<Vec<u8>>,
+        mut scanner: Scanner,
+    ) -> Result<Self, Error> {
+        let mut reader = locked.try_clone().map_err(Error::io("open"))?;
+        let (file, append) = resume::copy(locked, path)?;
+        let mut copy = Self {
+            append,
+            ..Self::new(file, old.schema.clone())
+        };
+        copy.put_header(old.clone().with_form(Form::File).renewed())?;
+        if let Some(content) = single {
+            let block = block::only(old, &content, content.len() as u64, |_| true)?;
+            copy.put_again(old, &content, &block).map_err(Error::header)??;
+        }
+        while let Some(found) = scanner.next(&mut reader, old)? {
+            if found.kind == Kind::Block {
+                let block = scanner.decoded(old, &found, |_| true)?;
+                let content = block::content_of(scanner.bytes(&found));
+                let put = content.and_then(|content| copy.put_again(old, content, &block));
+                put.map_err(|damage| found.damaged(damage))??;
+            }
+        }
+        copy.next_tick = resume::next_tick(&copy.segments, &copy.entries);
+        Ok(copy)
     }
 
     /// Writes the rows so far as a block, even if it is not full, and waits until the storage device has them.
@@ -275,9 +312,33 @@ impl<W: Write> Recorder<W> {
         if starts == Starts::Learned {
             header = header.with_starts(&self.rows.columns);
         }
+        self.put_header(header)
+    }
+
+    fn put_header(&mut self, header: Header) -> Result<(), Error> {
         self.write(&header.to_bytes())?;
         self.segment_start = self.offset;
         self.header = Some(header);
+        Ok(())
+    }
+
+    /// Puts a block of another header, of this content, behind the others.
+    fn put_again(&mut self, old: &Header, content: &[u8], block: &Block) -> Result<Result<(), Error>, Damage> {
+        let content = block::renewed(old, content, self.next_number)?;
+        let check = self.header.as_ref().map_or(0, |header| header.check);
+        let bytes = checked(check, &[], &content);
+        let entry = Entry::of(bytes.len() as u64, &block.ticks, &block.columns);
+        Ok(self.put(&bytes, entry))
+    }
+
+    /// Puts a block behind the others, and a segment of the index if it is full.
+    fn put(&mut self, bytes: &[u8], entry: Entry) -> Result<(), Error> {
+        self.write(bytes)?;
+        self.entries.push(entry);
+        self.next_number += 1;
+        if self.entries.len() == BLOCKS_PER_SEGMENT {
+            self.write_segment(index::SEGMENT)?;
+        }
         Ok(())
     }
 
@@ -291,13 +352,8 @@ impl<W: Write> Recorder<W> {
         let (bytes, restored) = block::encode(header, self.next_number, ticks, columns, &own, self.effort);
         // The index has the ends of what a reader gets, which may lie outside those of the samples.
         let entry = Entry::of(bytes.len() as u64, ticks, &restored);
-        self.write(&bytes)?;
-        self.entries.push(entry);
-        self.next_number += 1;
+        self.put(&bytes, entry)?;
         self.rows.remove(self.rows.ticks.len());
-        if self.entries.len() == BLOCKS_PER_SEGMENT {
-            self.write_segment(index::SEGMENT)?;
-        }
         Ok(())
     }
 

@@ -3,13 +3,12 @@
 use crate::append::{self, Append};
 use crate::block;
 use crate::error::Error;
-use crate::header::{Form, Header, VERSION_5};
+use crate::header::{Header, VERSION_5};
 use crate::index::{self, BLOCKS_PER_SEGMENT, Entry, Segment};
 use crate::playback::{self, Index};
-use crate::scan::{Kind, Scanner, decoded};
-use crate::wire::checked;
+use crate::scan::{Kind, Scanner};
 use std::fs::File;
-use std::io::{Seek, SeekFrom, Write};
+use std::io::{Seek, SeekFrom};
 use std::path::Path;
 
 /// State of a recording that is to be continued.
@@ -22,8 +21,16 @@ pub(crate) struct Resumed {
     pub(crate) next_number: u64,
 }
 
-/// Opens a recording and locks it. The file where blocks are to be written stands at their place; nothing is overwritten yet.
-pub(crate) fn open(path: &Path) -> Result<(File, Append, Resumed), Error> {
+/// A recording that was opened and locked.
+pub(crate) enum Opened {
+    /// The file where blocks are to be written stands at their place; nothing is overwritten yet.
+    InPlace(File, Append, Box<Resumed>),
+    /// It has another form than one that goes on: its header, and the content of its only block or its blocks behind the scanner.
+    Other(File, Box<Header>, Option<Vec<u8>>, Scanner),
+}
+
+/// Opens a recording and locks it.
+pub(crate) fn open(path: &Path) -> Result<Opened, Error> {
     let mut file = File::options()
         .read(true)
         .write(true)
@@ -33,12 +40,10 @@ pub(crate) fn open(path: &Path) -> Result<(File, Append, Resumed), Error> {
     if !is_still_there(&file, path) {
         return Err(Error::Locked);
     }
-    let (header, single) = Scanner::new(0).header(&mut file)?;
-    if let Some(content) = single {
-        return copied(file, path, header, &content);
-    }
-    if header.version == VERSION_5 {
-        return renewed(file, path, &header);
+    let mut scanner = Scanner::default();
+    let (header, single) = scanner.header(&mut file)?;
+    if single.is_some() || header.version == VERSION_5 {
+        return Ok(Opened::Other(file, Box::new(header), single, scanner));
     }
     let mut index = playback::index_of(&mut file, &header)?;
     if let Some((offset, tail)) = append::kept(path) {
@@ -59,7 +64,7 @@ pub(crate) fn open(path: &Path) -> Result<(File, Append, Resumed), Error> {
     file.seek(SeekFrom::Start(resumed.offset)).map_err(Error::io("read"))?;
     let handle = file.try_clone().map_err(Error::io("open"))?;
     let append = Append::planned(handle, path, resumed.offset);
-    Ok((file, append, resumed))
+    Ok(Opened::InPlace(file, append, Box::new(resumed)))
 }
 
 /// Whether the file has still this name: another writer may have put a new one into its place before the lock.
@@ -80,7 +85,7 @@ fn is_still_there(file: &File, path: &Path) -> bool {
 }
 
 /// An empty, locked file beside a recording, which takes its place when the append is complete.
-fn copy(locked: File, path: &Path) -> Result<(File, Append), Error> {
+pub(crate) fn copy(locked: File, path: &Path) -> Result<(File, Append), Error> {
     let mut options = File::options();
     options.read(true).write(true).create(true).truncate(true);
     let file = options.open(append::beside(path)).map_err(Error::io("copy"))?;
@@ -89,85 +94,8 @@ fn copy(locked: File, path: &Path) -> Result<(File, Append), Error> {
     Ok((file, append))
 }
 
-/// A copy of a recording of version 5 with the heads of this version. Its blocks keep their bytes otherwise.
-fn renewed(mut locked: File, path: &Path, old: &Header) -> Result<(File, Append, Resumed), Error> {
-    locked.seek(SeekFrom::Start(0)).map_err(Error::io("read"))?;
-    let mut scanner = Scanner::new(0);
-    scanner.header(&mut locked)?;
-    let mut reader = locked.try_clone().map_err(Error::io("open"))?;
-    let (mut file, append) = copy(locked, path)?;
-    let header = old.clone().renewed();
-    let start = header.to_bytes();
-    file.write_all(&start).map_err(Error::io("copy"))?;
-    let mut state = Resumed {
-        offset: start.len() as u64,
-        next_tick: 0,
-        next_number: 0,
-        header,
-        segments: Vec::new(),
-        entries: Vec::new(),
-    };
-    let mut segment_start = state.offset;
-    while let Some(found) = scanner.next(&mut reader, old)? {
-        if found.kind != Kind::Block {
-            continue;
-        }
-        let block = decoded(old, &scanner, &found, |_| true)?;
-        let content = block::content_of(scanner.bytes(&found));
-        let content = content.and_then(|content| block::renewed(old, content, state.next_number));
-        let content = content.map_err(|damage| Error::Block {
-            offset: found.offset,
-            bytes: found.length as u64,
-            damage,
-        })?;
-        let bytes = checked(state.header.check, &[], &content);
-        file.write_all(&bytes).map_err(Error::io("copy"))?;
-        state.offset += bytes.len() as u64;
-        state.next_number += 1;
-        state
-            .entries
-            .push(Entry::of(bytes.len() as u64, &block.ticks, &block.columns));
-        if state.entries.len() == BLOCKS_PER_SEGMENT {
-            let content = index::push_segment(&state.header, &state.entries);
-            let bytes = index::special(state.header.check, index::SEGMENT, &content);
-            file.write_all(&bytes).map_err(Error::io("copy"))?;
-            let segment = Segment::new(segment_start, bytes.len() as u64, &state.entries);
-            (segment_start, state.offset) = (segment.end(), segment.end());
-            state.segments.push(segment);
-            state.entries.clear();
-        }
-    }
-    state.next_tick = next_tick(&state.segments, &state.entries);
-    Ok((file, append, state))
-}
-
-/// A copy of a recording of a single block in the form that can be continued.
-fn copied(locked: File, path: &Path, header: Header, content: &[u8]) -> Result<(File, Append, Resumed), Error> {
-    let damaged = |damage| Error::Block {
-        offset: 0,
-        bytes: content.len() as u64,
-        damage,
-    };
-    let block = block::decode_content(&header, content, |_| true).map_err(damaged)?;
-    let content = block::renewed(&header, content, 0).map_err(damaged)?;
-    let header = header.with_form(Form::File).renewed();
-    let (start, bytes) = (header.to_bytes(), checked(header.check, &[], &content));
-    let (mut file, append) = copy(locked, path)?;
-    file.write_all(&[start.as_slice(), &bytes].concat())
-        .map_err(Error::io("copy"))?;
-    let entries = vec![Entry::of(bytes.len() as u64, &block.ticks, &block.columns)];
-    let resumed = Resumed {
-        offset: (start.len() + bytes.len()) as u64,
-        next_tick: next_tick(&[], &entries),
-        next_number: 1,
-        header,
-        segments: Vec::new(),
-        entries,
-    };
-    Ok((file, append, resumed))
-}
-
-fn next_tick(segments: &[Segment], entries: &[Entry]) -> i64 {
+/// The tick behind all rows.
+pub(crate) fn next_tick(segments: &[Segment], entries: &[Entry]) -> i64 {
     let of_entries = entries.iter().filter(|entry| entry.rows > 0).map(|entry| entry.ticks.1);
     let of_segments = segments
         .iter()
@@ -181,7 +109,7 @@ fn next_tick(segments: &[Segment], entries: &[Entry]) -> i64 {
 
 /// The state from footer and last segment; `None` if the last segment or block is damaged.
 fn from_index(file: &mut File, header: &Header, mut segments: Vec<Segment>) -> Result<Option<Resumed>, Error> {
-    let start = header.to_bytes().len() as u64;
+    let start = header.length as u64;
     let (mut entries, mut offset) = (Vec::new(), segments.last().map_or(start, Segment::end));
     let mut next_number = 0;
     if let Some(last) = segments.last().copied() {
@@ -225,7 +153,7 @@ fn last_number(file: &mut File, header: &Header, start: u64, entries: &[Entry]) 
 /// The state from the blocks themselves, which are decoded once for their ranges.
 fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
     file.seek(SeekFrom::Start(0)).map_err(Error::io("read"))?;
-    let mut scanner = Scanner::new(0);
+    let mut scanner = Scanner::default();
     scanner.header(file)?;
     let columns = header.schema.columns.len();
     let (mut offset, mut segment_start) = (scanner.consumed(), scanner.consumed());
@@ -244,7 +172,7 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
         }
         offset = found.offset + found.length as u64;
         match found.kind {
-            Kind::Block => entries.push(match decoded(&header, &scanner, &found, |_| true) {
+            Kind::Block => entries.push(match scanner.decoded(&header, &found, |_| true) {
                 // A block out of its place is not read.
                 Ok(block) if block.number.is_none_or(|number| number >= next_number) => {
                     next_number = block.number.map_or(0, |number| number + 1);

@@ -2,7 +2,7 @@
 
 use crate::block::{self, Block};
 use crate::error::{Damage, Error};
-use crate::header::{Form, Header, MAX_HEADER};
+use crate::header::{Header, MAX_HEADER};
 use crate::header_read::Known;
 use crate::index::{self, TRAILER_BYTES};
 use crate::rolling::Prefixes;
@@ -32,6 +32,17 @@ pub(crate) struct Found {
     pub(crate) length: usize,
 }
 
+impl Found {
+    /// Damage of this record.
+    pub(crate) fn damaged(&self, damage: Damage) -> Error {
+        Error::Block {
+            offset: self.offset,
+            bytes: self.length as u64,
+            damage,
+        }
+    }
+}
+
 /// Finds complete records and skips damaged bytes. The reader is handed in at each call, always the same one.
 #[derive(Debug, Default)]
 pub(crate) struct Scanner {
@@ -44,15 +55,22 @@ pub(crate) struct Scanner {
     /// Position of the last record found.
     current: usize,
     pending: Option<Found>,
+    /// The order of blocks.
+    order: Order,
+    /// A block whose missing neighbours were reported first.
+    misses_others: Option<Block>,
+    /// Whether the last record found is the end of a recording.
+    has_end: bool,
     /// Checksums of the buffer's prefixes, while a record is searched for.
     prefixes: Prefixes,
 }
 
 impl Scanner {
-    /// A scanner of a reader whose first byte has this offset.
-    pub(crate) fn new(offset: u64) -> Self {
+    /// A scanner of a reader whose first byte has this offset, where blocks follow in this order.
+    pub(crate) fn new(offset: u64, order: Order) -> Self {
         Self {
             offset,
+            order,
             ..Self::default()
         }
     }
@@ -88,8 +106,8 @@ impl Scanner {
     pub(crate) fn header(&mut self, reader: &mut impl Read) -> Result<(Header, Option<Vec<u8>>), Error> {
         loop {
             match Header::read(&self.buffer)? {
-                Known::Header(header, length) => {
-                    self.position = length;
+                Known::Header(header) => {
+                    self.position = header.length;
                     return Ok((*header, None));
                 }
                 Known::Single if self.ended => {
@@ -226,6 +244,56 @@ impl Scanner {
             }
         }
     }
+
+    /// The next block in its place; `None` at the end. Damaged bytes, and blocks that are missing or out of their place, give an error each.
+    pub(crate) fn next_block(
+        &mut self,
+        reader: &mut impl Read,
+        header: &Header,
+        wanted: impl Fn(usize) -> bool,
+    ) -> Option<Result<Block, Error>> {
+        if let Some(block) = self.misses_others.take() {
+            return Some(Ok(block));
+        }
+        loop {
+            let found = match self.next(reader, header) {
+                Ok(found) => found?,
+                Err(error) => return Some(Err(error)),
+            };
+            self.has_end = found.kind == Kind::Footer;
+            if found.kind != Kind::Block {
+                continue;
+            }
+            let block = match self.decoded(header, &found, &wanted) {
+                Ok(block) => block,
+                Err(error) => return Some(Err(error)),
+            };
+            let Some(damage) = self.order.judge(block.number) else {
+                return Some(Ok(block));
+            };
+            self.misses_others = (damage == Damage::Missing).then_some(block);
+            return Some(Err(Error::Block {
+                offset: found.offset,
+                bytes: if damage == Damage::Missing {
+                    0
+                } else {
+                    found.length as u64
+                },
+                damage,
+            }));
+        }
+    }
+
+    /// Decodes the last block found.
+    pub(crate) fn decoded(
+        &self,
+        header: &Header,
+        found: &Found,
+        wanted: impl Fn(usize) -> bool,
+    ) -> Result<Block, Error> {
+        let block = block::decode(header, self.bytes(found), wanted);
+        block.map_err(|damage| found.damaged(damage))
+    }
 }
 
 /// The order of blocks: which number comes next; `None` before the first block of a stretch whose place is not known.
@@ -263,10 +331,6 @@ pub struct BlockReader<R> {
     scanner: Scanner,
     header: Header,
     single: Option<Vec<u8>>,
-    order: Order,
-    /// A block whose missing neighbours were reported first.
-    pending: Option<Block>,
-    has_end: bool,
     told_end: bool,
 }
 
@@ -276,16 +340,13 @@ impl<R: Read> BlockReader<R> {
     /// # Errors
     /// If reading fails, or the source does not begin with a complete header of a version that is known.
     pub fn new(mut reader: R) -> Result<Self, Error> {
-        let mut scanner = Scanner::new(0);
+        let mut scanner = Scanner::default();
         let (header, single) = scanner.header(&mut reader)?;
         Ok(Self {
             reader,
             scanner,
-            has_end: header.form == Form::Single,
             header,
             single,
-            order: Order::default(),
-            pending: None,
             told_end: false,
         })
     }
@@ -297,14 +358,17 @@ impl<R: Read> BlockReader<R> {
 
     /// The end, or an error once if there should be one and is none.
     fn end(&mut self) -> Option<Result<Block, Error>> {
-        if self.has_end || !self.header.has_end() || std::mem::replace(&mut self.told_end, true) {
-            return None;
-        }
-        Some(Err(Error::Block {
-            offset: self.scanner.consumed(),
-            bytes: 0,
-            damage: Damage::NoEnd,
-        }))
+        let is_told = self.scanner.has_end || !self.header.has_end() || std::mem::replace(&mut self.told_end, true);
+        (!is_told).then(|| Err(no_bytes(self.scanner.consumed(), Damage::NoEnd)))
+    }
+}
+
+/// Damage that has no bytes of its own.
+pub(crate) fn no_bytes(offset: u64, damage: Damage) -> Error {
+    Error::Block {
+        offset,
+        bytes: 0,
+        damage,
     }
 }
 
@@ -314,62 +378,10 @@ impl<R: Read> Iterator for BlockReader<R> {
     type Item = Result<Block, Error>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if let Some(block) = self.pending.take() {
-            return Some(Ok(block));
-        }
         if let Some(content) = self.single.take() {
-            let block = block::decode_content(&self.header, &content, |_| true);
-            return Some(block.map_err(|damage| Error::Block {
-                offset: 0,
-                bytes: self.scanner.consumed(),
-                damage,
-            }));
+            return Some(block::only(&self.header, &content, self.scanner.consumed(), |_| true));
         }
-        loop {
-            let found = match self.scanner.next(&mut self.reader, &self.header) {
-                Ok(Some(found)) => found,
-                Ok(None) => return self.end(),
-                Err(error) => return Some(Err(error)),
-            };
-            self.has_end = found.kind == Kind::Footer;
-            if found.kind == Kind::Block {
-                let block = match decoded(&self.header, &self.scanner, &found, |_| true) {
-                    Ok(block) => block,
-                    Err(error) => return Some(Err(error)),
-                };
-                let Some(damage) = self.order.judge(block.number) else {
-                    return Some(Ok(block));
-                };
-                self.pending = (damage == Damage::Missing).then_some(block);
-                return Some(Err(damage_of(&found, damage)));
-            }
-        }
+        let next = self.scanner.next_block(&mut self.reader, &self.header, |_| true);
+        next.or_else(|| self.end())
     }
-}
-
-/// Damage of the order of blocks, at a block.
-pub(crate) fn damage_of(found: &Found, damage: Damage) -> Error {
-    Error::Block {
-        offset: found.offset,
-        bytes: if damage == Damage::Missing {
-            0
-        } else {
-            found.length as u64
-        },
-        damage,
-    }
-}
-
-/// Decodes a block that the scanner found.
-pub(crate) fn decoded(
-    header: &Header,
-    scanner: &Scanner,
-    found: &Found,
-    wanted: impl Fn(usize) -> bool,
-) -> Result<Block, Error> {
-    block::decode(header, scanner.bytes(found), wanted).map_err(|damage| Error::Block {
-        offset: found.offset,
-        bytes: found.length as u64,
-        damage,
-    })
 }

@@ -1,13 +1,9 @@
 //! Texts as bytes, records with a length and a checksum. Integers and the byte reader are those of the block codec.
 
 use crate::error::Damage;
-use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use fewbits_block_codec::bytes::Unread;
 pub(crate) use fewbits_block_codec::bytes::{Bytes, push_varint, unzigzag, zigzag};
 use std::ops::RangeInclusive;
-
-/// The checksum of headers, blocks and index: CRC-32 as in zip and PNG.
-static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 
 /// The oldest version of the format that is read.
 pub(crate) const VERSION_5: u8 = 5;
@@ -15,9 +11,9 @@ pub(crate) const VERSION_5: u8 = 5;
 /// Bytes of a checksum.
 pub(crate) const CHECK_BYTES: usize = 4;
 
-/// The checksum of the concatenated parts.
+/// The checksum of the concatenated parts, of headers, blocks and index: CRC-32 as in zip and PNG.
 pub(crate) fn checksum(parts: &[&[u8]]) -> u32 {
-    let mut digest = CRC.digest();
+    let mut digest = crc32fast::Hasher::new();
     for part in parts {
         digest.update(part);
     }

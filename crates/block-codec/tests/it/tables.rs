@@ -39,9 +39,9 @@ proptest! {
 
     #[test]
     fn any_bytes_behind_a_head_of_tables_are_total(bytes in prop::collection::vec(any::<u8>(), 0..300), rows in 2048..9000_usize) {
-        // Tables that learn, and stored ones.
-        for second in [0x40, 0x80] {
-            let block = [&[0xb0 | 13, second], bytes.as_slice()].concat();
+        // Tables that learn, stored ones, and sections.
+        for head in [[0xb0 | 13, 0x40], [0xb0 | 13, 0x80], [0x8f, 0xc0]] {
+            let block = [head.as_slice(), bytes.as_slice()].concat();
             if let Ok(values) = fast(0.1).decode(&block, rows) {
                 prop_assert_eq!(values.len(), rows);
             }
@@ -226,4 +226,46 @@ fn the_chosen_coding_is_little_longer_than_the_default() {
             assert!(fast <= thorough * 5 / 4 + 32, "{name}, {codec:?}: {fast} for {thorough}");
         }
     }
+}
+
+/// Signals of several kinds one behind the other: each has a section, whose bits it would need alone.
+#[test]
+fn a_signal_that_changes_its_kind_has_sections() {
+    let noise = |row: usize| (row.wrapping_mul(2_654_435_761) >> 16) % 4001;
+    let kinds: [fn(usize, f64) -> f64; 4] = [
+        |row, _| (row as f64 / 300.0).sin() * 50.0,
+        |_, noise| (noise / 40.0).floor() / 10.0,
+        |row, noise| (row / 900) as f64 + if noise < 3.0 { 1.0 } else { 0.0 },
+        |_, noise| noise * noise * 0.001,
+    ];
+    let parts: Vec<Vec<f64>> = kinds
+        .iter()
+        .map(|kind| (0..6144).map(|row| kind(row, noise(row) as f64)).collect())
+        .collect();
+    let samples = parts.concat();
+    for codec in [fast(0.05), BlockCodec::lossless().with_effort(Effort::Fast)] {
+        let bytes = codec.encode(&samples).unwrap();
+        let alone: usize = parts.iter().map(|part| codec.encode(part).unwrap().len()).sum();
+        assert_eq!(bytes[..2], [0x8f, 0xc0]);
+        assert!(bytes.len() < alone + alone / 50 + 64, "{} {alone}", bytes.len());
+        let values = codec.decode(&bytes, samples.len()).unwrap();
+        let delta = if codec == fast(0.05) { 0.05 } else { 0.0 };
+        assert!(
+            values
+                .iter()
+                .zip(&samples)
+                .all(|(value, sample)| (value - sample).abs() <= delta)
+        );
+        for rows in [1, 6144, samples.len() - 1, samples.len() + 1] {
+            assert!(codec.decode(&bytes, rows).is_err(), "{rows}");
+        }
+        for length in (0..64).chain(bytes.len() - 64..bytes.len()) {
+            assert!(codec.decode(&bytes[..length], samples.len()).is_err(), "{length}");
+        }
+        // Sections have none of their own.
+        let nested = [&[0x8f, 0xc0, 0], bytes.as_slice()].concat();
+        assert!(codec.decode(&nested, samples.len()).is_err());
+    }
+    let one = mixed(3, 20_000);
+    assert_ne!(fast(0.5).encode(&one).unwrap()[0], 0x8f, "a signal of one kind has no sections");
 }

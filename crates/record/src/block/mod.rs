@@ -11,7 +11,7 @@ use crate::codec::CodecId;
 use crate::error::Damage;
 use crate::header::Header;
 use crate::wire::read_checked;
-pub(crate) use read::{content_of, decode, decode_content, renewed};
+pub(crate) use read::{content_of, decode, only, renewed};
 pub(crate) use write::{content, encode};
 
 /// The cells of one column; `None` is a gap.

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::bound::Bound;
 use crate::codec::{self, CodecId, Context, JOINT_COLUMNS};
-use crate::error::Damage;
+use crate::error::{Damage, Error};
 use crate::header::{Header, VERSION_5};
 use crate::specials::{self, Specials};
 use crate::time::{self, TimeKind};
@@ -84,6 +84,23 @@ pub(crate) fn renewed(header: &Header, content: &[u8], number: u64) -> Result<Ve
     }
     content.extend_from_slice(body.0);
     Ok(content)
+}
+
+/// Decodes the only block of a recording of so many bytes.
+///
+/// # Errors
+/// If no recorder wrote it.
+pub(crate) fn only(
+    header: &Header,
+    content: &[u8],
+    bytes: u64,
+    wanted: impl Fn(usize) -> bool,
+) -> Result<Block, Error> {
+    decode_content(header, content, wanted).map_err(|damage| Error::Block {
+        offset: 0,
+        bytes,
+        damage,
+    })
 }
 
 /// Decodes the content of a block.

@@ -194,7 +194,7 @@ impl FrameReader {
         }
         let bytes: Vec<u8> = incomplete.pieces.into_iter().flatten().flatten().collect();
         let header = match Header::read(&bytes) {
-            Ok(Known::Header(header, length)) if length == bytes.len() && header.check == piece.check => *header,
+            Ok(Known::Header(header)) if header.length == bytes.len() && header.check == piece.check => *header,
             _ => return Err(Damage::Content("header")),
         };
         if header.schema.rows_per_block > max_rows(header.schema.columns.len()) {

@@ -1,0 +1,140 @@
+//! Blocks whose signal changes its kind: sections with a grid and a coding of their own.
+//!
+//! ```text
+//! number of sections less 1 (varint)
+//! each section                         its number of rows, its length in bytes (varints; the last one has what is left of both), a block without sections
+//! ```
+
+use crate::bytes::{Bytes, push_varint};
+use crate::head::{SAMPLES, STORED, TABLED};
+use crate::vectors::vectorised_narrow;
+use crate::{BlockCodec, Error};
+use fewbits_node::elementary::log2;
+
+/// The first bytes of a block of sections.
+pub(crate) const SECTIONS: [u8; 2] = [SAMPLES | 128, TABLED | STORED];
+
+/// Rows of a piece, at whose ends sections may end.
+const PIECE: usize = 2048;
+/// Smallest number of rows of a block that may have sections.
+pub(crate) const LEAST_ROWS: usize = 4 * PIECE;
+/// Differences of a piece that are counted: runs of so many rows, a run in so many rows.
+const RUN: usize = 64;
+const EVERY: usize = 256;
+/// Classes of differences.
+const CLASSES: usize = 64;
+/// Bits that a section costs in addition to its rows.
+const BITS_OF_SECTION: f32 = 1200.0;
+
+/// Pieces that belong together.
+struct Group {
+    rows: usize,
+    counts: [u16; CLASSES],
+    bits: f32,
+}
+
+impl Group {
+    #[inline(always)]
+    fn new(rows: usize, counts: [u16; CLASSES]) -> Self {
+        let (mut terms, mut sum) = ([0.0; CLASSES], 0);
+        for (term, count) in terms.iter_mut().zip(&counts) {
+            let number = f32::from((*count).max(1));
+            *term = number * log2(number);
+            sum += *count;
+        }
+        // The bits of all rows, of which some are counted.
+        let sum = f32::from(sum.max(1));
+        let bits = rows as f32 * (log2(sum) - terms.iter().sum::<f32>() / sum);
+        Self { rows, counts, bits }
+    }
+
+    #[inline(always)]
+    fn of(piece: &[i64]) -> Self {
+        let mut counts = [0; CLASSES];
+        for run in piece.chunks(EVERY) {
+            for pair in run[..run.len().min(RUN)].windows(2) {
+                counts[class(pair[1].wrapping_sub(pair[0]))] += 1;
+            }
+        }
+        Self::new(piece.len(), counts)
+    }
+
+    #[inline(always)]
+    fn joined(&self, other: &Self) -> Self {
+        let mut counts = self.counts;
+        for (own, other) in counts.iter_mut().zip(&other.counts) {
+            *own += other;
+        }
+        Self::new(self.rows + other.rows, counts)
+    }
+}
+
+/// A class of differences: small ones have their own, of larger ones those of one length in bits share one.
+#[inline(always)]
+fn class(step: i64) -> usize {
+    let size = step.unsigned_abs();
+    if size < 4 {
+        2 * size as usize + usize::from(step < 0)
+    } else {
+        (6 + size.ilog2() as usize).min(CLASSES - 1)
+    }
+}
+
+/// The rows of each section; one section if the signal is of one kind.
+pub(crate) fn sections(numbers: &[i64]) -> Vec<usize> {
+    vectorised_narrow(
+        #[inline(always)]
+        || of(numbers),
+    )
+}
+
+#[inline(always)]
+fn of(numbers: &[i64]) -> Vec<usize> {
+    let mut groups: Vec<Group> = numbers.chunks(PIECE).map(Group::of).collect();
+    let mut joined: Vec<Group> = groups.windows(2).map(|pair| pair[0].joined(&pair[1])).collect();
+    loop {
+        let lost = |at: usize| joined[at].bits - groups[at].bits - groups[at + 1].bits;
+        let best = (0..joined.len()).min_by(|a, b| lost(*a).total_cmp(&lost(*b)));
+        let Some(at) = best.filter(|at| lost(*at) < BITS_OF_SECTION) else {
+            return groups.iter().map(|group| group.rows).collect();
+        };
+        groups[at] = joined.remove(at);
+        groups.remove(at + 1);
+        for place in at.saturating_sub(1)..(at + 1).min(joined.len()) {
+            joined[place] = groups[place].joined(&groups[place + 1]);
+        }
+    }
+}
+
+impl BlockCodec {
+    /// A block of sections of so many rows each.
+    pub(crate) fn encode_sections(&self, mut samples: &[f64], sections: &[usize]) -> Result<Vec<u8>, Error> {
+        let mut bytes = SECTIONS.to_vec();
+        push_varint(&mut bytes, sections.len() as u64 - 1);
+        for (place, rows) in sections.iter().enumerate() {
+            let (section, others) = samples.split_at(*rows);
+            let block = self.encode_section(section)?;
+            if place + 1 < sections.len() {
+                push_varint(&mut bytes, *rows as u64);
+                push_varint(&mut bytes, block.len() as u64);
+            }
+            bytes.extend(block);
+            samples = others;
+        }
+        Ok(bytes)
+    }
+
+    /// The samples of a block of sections, behind its first bytes.
+    pub(crate) fn decode_sections(&self, bytes: &[u8], rows: usize) -> Result<Vec<f64>, Error> {
+        let mut bytes = Bytes(bytes);
+        let mut samples = Vec::new();
+        for _ in 0..bytes.count(rows - 1, "number of sections")? {
+            let left = rows - samples.len();
+            let own = bytes.count(left.saturating_sub(1), "rows of a section")?.max(1);
+            let length = bytes.count(usize::MAX, "length of a section")?;
+            samples.extend(self.decode_section(bytes.take(length)?, own, &[])?);
+        }
+        samples.extend(self.decode_section(bytes.0, rows - samples.len(), &[])?);
+        Ok(samples)
+    }
+}
