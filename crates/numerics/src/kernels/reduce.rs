@@ -134,6 +134,7 @@ pub struct ExpSums {
 
 /// Writes `e_i = exp(logs[i] - offset)` to `out[i]` over the length of the shorter slice and returns `sum e_i` and `sum e_i^2` (weights,
 /// their total, and the sum that the effective sample size needs) in one pass.
+#[expect(clippy::neg_cmp_op_on_partial_ord, reason = "NaN is not ordinary")]
 pub fn exp_minus(logs: &[f64], offset: f64, out: &mut [f64]) -> ExpSums {
     vectorised(
         #[inline(always)]
