@@ -1,6 +1,7 @@
 //! Likelihoods that the user states as Python functions, and the observations that go to them.
 
 use crate::error::{Outcome, refused};
+use crate::given::key;
 use crate::table::{Cells, Given, Times};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -26,7 +27,7 @@ impl Likelihoods {
             if !function.is_callable() {
                 return refused(argument, function.get_type().name()?, expected);
             }
-            functions.push((name.extract()?, function.unbind()));
+            functions.push((key(argument, &name)?, function.unbind()));
         }
         if functions.is_empty() {
             return refused(argument, "an empty dictionary", expected);
@@ -73,7 +74,7 @@ impl Likelihoods {
                 };
                 let mut all = Vec::with_capacity(observed.len());
                 for (name, one) in observed {
-                    let name: String = name.extract()?;
+                    let name = key("observation", &name)?;
                     let Some(at) = functions.iter().position(|(known, _)| *known == name) else {
                         let known: Vec<&str> = functions.iter().map(|(known, _)| known.as_str()).collect();
                         return refused("observation", format!("'{name}'"), format!("one of {}", known.join(", ")));

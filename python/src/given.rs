@@ -4,7 +4,7 @@
 //! name from that note (`fewbits/errors.py`).
 
 use crate::array::shown;
-use crate::error::wrong;
+use crate::error::{Outcome, wrong};
 use crate::record::Stated;
 use pyo3::PyTypeInfo;
 use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
@@ -94,10 +94,18 @@ pub(crate) fn named<'a, 'py, T: FromPyObject<'a, 'py> + Expected>(given: &'a Bou
         let py = given.py();
         let range = error.is_instance_of::<PyOverflowError>(py);
         match range || error.is_instance_of::<PyTypeError>(py) || error.is_instance_of::<PyValueError>(py) {
-            true => wrong(value(given), T::expected(), !range),
+            true => wrong("", value(given), T::expected(), !range),
             false => error,
         }
     })
+}
+
+/// A key of the dictionary that is the argument `name`.
+pub(crate) fn key(name: &'static str, given: &Bound<'_, PyAny>) -> Outcome<String> {
+    let text = given.extract::<String>();
+    Ok(text.map_err(|_| {
+        wrong(name, format!("a dictionary with the key {}", value(given)), "texts as keys".to_owned(), true)
+    })?)
 }
 
 /// An argument of a class of this package.
@@ -110,7 +118,7 @@ pub(crate) fn of_class<'a, 'py, T: PyTypeInfo>(given: &'a Bound<'py, PyAny>) -> 
                 .map_or("class".into(), |name| name.to_string())
         )
     };
-    given.cast::<T>().map_err(|_| wrong(value(given), expected(), true))
+    given.cast::<T>().map_err(|_| wrong("", value(given), expected(), true))
 }
 
 /// As [`of_class`], or nothing.

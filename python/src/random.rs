@@ -4,9 +4,10 @@ use crate::array::{line, shown, vector, zeros};
 use crate::error::{Outcome, refused};
 use crate::given::named;
 use crate::stored::{self, Reduced};
+use crate::weights::exponentials;
 use fewbits_filters::Resampling;
 use fewbits_monte_carlo::Stream;
-use fewbits_numerics::kernels::{StandardNormals, vectorised};
+use fewbits_numerics::kernels::{StandardNormals, largest_number, vectorised};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -173,10 +174,21 @@ pub(crate) fn normalise<'py>(
     py: Python<'py>,
     log_weights: &Bound<'py, PyAny>,
 ) -> Outcome<(Bound<'py, PyArray1<f64>>, f64, f64)> {
-    let mut logs = vector("log_weights", log_weights)?;
-    let mut weights = vec![0.0; logs.len()];
-    let (log_sum, size) = fewbits_densities::normalise_log_weights(&mut logs, &mut weights)?;
-    Ok((PyArray1::from_vec(py, weights), log_sum, size))
+    // Without a copy of an array: memory for two would go back to the system after each call, and is slow to get again.
+    let own;
+    let given = line::<f64>("log_weights", log_weights);
+    let logs = match &given {
+        Ok(given) => given.as_slice().map_err(PyErr::from)?,
+        Err(_) => {
+            own = vector("log_weights", log_weights)?;
+            &own
+        }
+    };
+    let mut weights = zeros(logs.len())?;
+    let sums = exponentials(logs, largest_number(logs), &mut weights)?;
+    let scale = 1.0 / sums.sum;
+    weights.iter_mut().for_each(|weight| *weight *= scale);
+    Ok((PyArray1::from_vec(py, weights), sums.log_sum, sums.effective_sample_size))
 }
 
 /// Indices of `count` draws (as many as there are weights, if left out) with probabilities in proportion to weights of any sum. `scheme` is

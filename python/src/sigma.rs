@@ -3,7 +3,7 @@
 use crate::array::{matrix, shown, vector};
 use crate::callbacks::{Likelihoods, returned};
 use crate::error::{Failure, Outcome, refused};
-use crate::given::named;
+use crate::given::{key, named};
 use crate::model::{square, with_dimension};
 use crate::rows::Rows;
 use crate::seat::Sends;
@@ -481,8 +481,8 @@ fn by_column<T>(
         return names.iter().map(|_| parsed(given)).collect();
     };
     let known: Vec<&str> = names.iter().copied().flatten().collect();
-    for key in each.keys() {
-        let key: String = key.extract()?;
+    for given in each.keys() {
+        let key = key(name, &given)?;
         if !known.contains(&key.as_str()) {
             return refused(name, format!("'{key}'"), format!("one of {}", known.join(", ")));
         }

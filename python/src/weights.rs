@@ -58,6 +58,32 @@ pub(crate) fn add(logs: &mut [f64], before: &Before<'_>, found: &[f64]) -> Optio
     largest
 }
 
+/// Sums of exponentials of log weights.
+pub(crate) struct Sums {
+    /// Relative to the largest.
+    pub(crate) sum: f64,
+    /// Logarithm of the sum, not relative.
+    pub(crate) log_sum: f64,
+    pub(crate) effective_sample_size: f64,
+}
+
+/// Writes the exponentials of log weights of the given largest one, relative to it: none overflows, and the sum is at least one. On failure
+/// nothing is written.
+pub(crate) fn exponentials(logs: &[f64], largest: Option<f64>, out: &mut [f64]) -> Result<Sums, Error> {
+    match largest {
+        Some(f64::NEG_INFINITY) => Err(Error::Impossible),
+        Some(largest) if largest < f64::INFINITY => {
+            let sums = exp_minus(logs, largest, out);
+            Ok(Sums {
+                sum: sums.sum,
+                log_sum: largest + sums.sum.ln(),
+                effective_sample_size: sums.sum * sums.sum / sums.sum_of_squares,
+            })
+        }
+        _ => Err(Error::NotANumber { what: "a log weight" }),
+    }
+}
+
 impl Weights {
     /// `count` equal weights.
     pub(crate) fn equal(count: usize) -> Self {
@@ -82,16 +108,9 @@ impl Weights {
     /// Takes on new log weights of the given largest one; `logs` then has the earlier ones. Returns the logarithm of the sum of their
     /// exponentials. On failure nothing is changed.
     pub(crate) fn replace(&mut self, logs: &mut Vec<f64>, largest: Option<f64>) -> Result<f64, Error> {
-        match largest {
-            Some(f64::NEG_INFINITY) => return Err(Error::Impossible),
-            Some(largest) if largest < f64::INFINITY => {
-                // Relative to the largest, so that no exponential overflows and the sum is at least one.
-                let sums = exp_minus(logs, largest, &mut self.scaled);
-                (self.sum, self.log_sum) = (sums.sum, largest + sums.sum.ln());
-                self.effective_sample_size = sums.sum * sums.sum / sums.sum_of_squares;
-            }
-            _ => return Err(Error::NotANumber { what: "a log weight" }),
-        }
+        let sums = exponentials(logs, largest, &mut self.scaled)?;
+        (self.sum, self.log_sum) = (sums.sum, sums.log_sum);
+        self.effective_sample_size = sums.effective_sample_size;
         std::mem::swap(&mut self.logs, logs);
         Ok(self.log_sum)
     }

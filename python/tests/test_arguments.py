@@ -25,7 +25,7 @@ anything = st.one_of(
     st.binary(max_size=40),
     st.lists(st.floats(), max_size=4),
     st.lists(st.lists(st.floats(-10, 10), min_size=2, max_size=2), max_size=3),
-    st.dictionaries(st.sampled_from(["a", "t", "*"]), st.one_of(st.floats(), st.text(max_size=4)), max_size=2),
+    st.dictionaries(st.sampled_from(["a", "t", "*", 1, None, b"a"]), st.one_of(st.floats(), st.text(max_size=4)), max_size=2),
     hnp.arrays(st.sampled_from(["f8", "f4", "i8", "u8", "i2", "?", "U2"]), hnp.array_shapes(min_dims=0, max_dims=3, max_side=4)),
     st.just(lambda *given: np.zeros(3)),
     st.builds(lambda: pl.DataFrame({"t": [0.0, 1.0], "a": [1.0, None]})),
@@ -475,3 +475,24 @@ def test_numbers_out_of_range_and_of_other_types_are_named():
 
     with pytest.raises(RuntimeError, match="mine"):
         fb.Model.walk(Failing())
+
+
+@pytest.mark.parametrize("key", [1, None, b"a", ("a",), "\ud800"])
+@pytest.mark.parametrize(
+    ("name", "call"),
+    [
+        ("columns", lambda key: fb.Table({key: [1.0]})),
+        ("columns", lambda key: fb.Table({"a": [1.0], key: [1.0]})),
+        ("likelihood", lambda key: fb.ParticleFilter(np.zeros((1, 3)), lambda x, dt, rng: None, {key: lambda x, z: x[0]}, seed=1)),
+        (
+            "observation",
+            lambda key: fb.ParticleFilter(np.zeros((1, 3)), lambda x, dt, rng: None, {"a": lambda x, z: x[0]}, seed=1).step({key: 1.0}),
+        ),
+        ("noise", lambda key: sigma(noise={key: 1.0})),
+        ("samples", lambda key: centre().step(0.0, {key: 1.0})),
+    ],
+)
+def test_keys_that_are_no_texts_are_named(name, call, key):
+    with pytest.raises(fb.ArgumentError) as caught:
+        call(key)
+    assert caught.value.name == name and repr(key)[:2] in caught.value.value and isinstance(caught.value, TypeError)

@@ -31,15 +31,53 @@ def series() -> dict[str, np.ndarray]:
     }
 
 
+def many(n: int = 400) -> dict[str, np.ndarray]:
+    """75 series: 15 kinds in five scales."""
+    found = {}
+    for scale in (1e-6, 0.01, 1.0, 37.0, 1e9):
+        rng = np.random.default_rng(int(np.log(scale) + 100))
+        t, steps = np.arange(n), np.cumsum(rng.standard_normal(n))
+        kinds = {
+            "sine": np.sin(t / 20),
+            "steep": np.exp(t / 90.0),
+            "trend": 0.3 * t + rng.standard_normal(n),
+            "walk": steps,
+            "twice": np.cumsum(steps),
+            "saw": (t % 60).astype(float),
+            "levels": np.repeat(rng.integers(0, 4, n // 20), 20).astype(float),
+            "spikes": np.where(rng.random(n) < 0.02, 100.0, 0.0) + 0.1 * rng.standard_normal(n),
+            "heavy": rng.standard_cauchy(n),
+            "rounded": np.round(steps, 1),
+            "rests": np.repeat(steps[::10], 10),
+            "counter": np.cumsum(rng.poisson(2, n)).astype(float),
+            "random": rng.random(n),
+            "gaps": np.where(rng.random(n) < 0.3, np.nan, np.cos(t / 9)),
+            "late": np.where(t < n // 2, np.nan, steps),
+        }
+        found |= {f"{kind} {scale:g}": scale * x for kind, x in kinds.items()}
+    return found
+
+
+def check(folder: pathlib.Path, columns: dict[str, np.ndarray], bound: str) -> None:
+    """The recordings of the command, which reads a text, and of Python."""
+    rows = zip(*(["" if np.isnan(v) else repr(v) for v in x.tolist()] for x in columns.values()), strict=True)
+    lines = [",".join(columns), *(",".join(row) for row in rows), ""]
+    (folder / "a.csv").write_text("\n".join(lines))
+    subprocess.run([COMMAND, "pack", folder / "a.csv", "--bound", bound, "-o", folder / "command"], check=True, capture_output=True)
+    fb.write(pl.DataFrame(columns).fill_nan(None), folder / "python", bounds=bound)
+    assert (folder / "command").read_bytes() == (folder / "python").read_bytes()
+
+
 @pytest.mark.skipif(not COMMAND.exists(), reason="the command is not built")
 @pytest.mark.parametrize("bound", ["1%", "±0.001", "lossless"])
 @pytest.mark.parametrize("name", series())
 def test_bytes_are_those_of_the_command(tmp_path, name, bound):
-    x = series()[name]
-    text = "\n".join(["x", *("" if np.isnan(v) else repr(float(v)) for v in x), ""])
-    (tmp_path / "a.csv").write_text(text)
-    subprocess.run(
-        [COMMAND, "pack", tmp_path / "a.csv", "--bound", bound, "-o", tmp_path / "command"], check=True, capture_output=True
-    )
-    fb.write(pl.DataFrame({"x": x}).with_columns(pl.col("x").fill_nan(None)), tmp_path / "python", bounds=bound)
-    assert (tmp_path / "command").read_bytes() == (tmp_path / "python").read_bytes()
+    check(tmp_path, {"x": series()[name]}, bound)
+
+
+@pytest.mark.skipif(not COMMAND.exists(), reason="the command is not built")
+@pytest.mark.parametrize("bound", ["1%", "±0.001", "lossless"])
+def test_bytes_of_many_series_are_those_of_the_command(tmp_path, bound):
+    columns = many()
+    assert len(columns) == 75
+    check(tmp_path, columns, bound)

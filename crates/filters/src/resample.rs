@@ -105,13 +105,19 @@ impl Resampling {
 /// Sum of the weights and the index of the last positive one.
 fn check(weights: &[f64]) -> Result<(f64, usize), ArgumentError> {
     let is_weight = |w: &f64| *w >= 0.0 && *w < f64::INFINITY;
-    // Without an early exit this runs in vector registers.
-    let bad = vectorised(
+    // One more in the exponent carries into the sign unless the number is finite. Without an early exit this runs in vector registers.
+    let signs = vectorised(
         #[inline(always)]
-        || weights.iter().fold(0_u64, |bad, w| bad | u64::from(!is_weight(w))),
+        || {
+            weights
+                .iter()
+                .fold(0, |all, w| all | w.to_bits() | w.to_bits().wrapping_add(1 << 52))
+        },
     );
-    if bad > 0 {
-        let bad = weights.iter().find(|w| !is_weight(w)).copied().unwrap_or(f64::NAN);
+    // A sign may also be that of a zero.
+    if signs >> 63 == 1
+        && let Some(bad) = weights.iter().find(|w| !is_weight(w))
+    {
         return Err(ArgumentError::new("weights", bad, "finite weights, 0 or above"));
     }
     let total = sum(weights);

@@ -67,16 +67,15 @@ pub fn systematic_into(weights: &[f64], total: f64, offset: f64, chosen: &mut [u
             let per_weight = chosen.len() as f64 / whole as f64;
             chosen.fill(0);
             let (mut carry, mut index, mut first) = (0, 0, 0_u32);
+            let (mut sums, mut other, mut firsts) = ([0; GROUP + BLOCK], [0; GROUP + BLOCK], [0_u32; BLOCK]);
             for weights in weights.chunks(BLOCK) {
-                let mut sums = [0; GROUP + BLOCK];
                 for (sum, weight) in sums[GROUP..].iter_mut().zip(weights) {
                     *sum = integer(*weight * scale);
                 }
-                add_before::<1>(&mut sums, &SAME_GROUP[0]);
-                add_before::<2>(&mut sums, &SAME_GROUP[1]);
-                add_before::<4>(&mut sums, &SAME_GROUP[2]);
-                let mut firsts = [0_u32; BLOCK];
-                for (firsts, sums) in firsts.chunks_exact_mut(GROUP).zip(sums[GROUP..].chunks_exact(GROUP)) {
+                add_before::<1>(&sums, &mut other, &SAME_GROUP[0]);
+                add_before::<2>(&other, &mut sums, &SAME_GROUP[1]);
+                add_before::<4>(&sums, &mut other, &SAME_GROUP[2]);
+                for (firsts, sums) in firsts.chunks_exact_mut(GROUP).zip(other[GROUP..].chunks_exact(GROUP)) {
                     for j in 0..GROUP {
                         let cumulative = f64::from_bits((carry + sums[j]) | INTEGERS.to_bits()) - INTEGERS;
                         firsts[j] = (cumulative * per_weight + (0.5 - offset) + ROUNDER).to_bits() as u32;
@@ -128,11 +127,14 @@ fn raised<const BACK: usize>(x: [u32; LANES]) -> [u32; LANES] {
     )
 }
 
-/// Adds to each sum the one `BACK` places before, within its group.
+/// Writes each sum with the one `BACK` places before, within its group, to `to`.
 #[inline(always)]
-fn add_before<const BACK: usize>(sums: &mut [u64; GROUP + BLOCK], same_group: &[u64; BLOCK]) {
-    let before = *sums;
+fn add_before<const BACK: usize>(
+    from: &[u64; GROUP + BLOCK],
+    to: &mut [u64; GROUP + BLOCK],
+    same_group: &[u64; BLOCK],
+) {
     for j in 0..BLOCK {
-        sums[GROUP + j] += before[GROUP + j - BACK] & same_group[j];
+        to[GROUP + j] = from[GROUP + j] + (from[GROUP + j - BACK] & same_group[j]);
     }
 }

@@ -91,6 +91,14 @@ impl Presence {
         (ratio, news)
     }
 
+    /// Logarithm of the probability that the sensor works.
+    pub(crate) fn log_working(&self) -> f64 {
+        if self.working == 1.0 {
+            return 0.0;
+        }
+        self.working.max(f64::MIN_POSITIVE).ln()
+    }
+
     /// Updates after a report arrived. Returns `ln` of the likelihood ratio of a common failure against none, and whether the sensor had
     /// been declared dead.
     pub(crate) fn report_arrived(&mut self) -> (f64, bool) {

@@ -131,3 +131,26 @@ fn weights_at_the_ends_of_the_range_are_shared_like_any_others() {
         }
     }
 }
+
+#[test]
+fn weights_are_refused_wherever_they_stand_and_zeros_may_have_a_sign() {
+    for at in 0..20 {
+        for bad in [
+            -1.0,
+            -f64::MIN_POSITIVE,
+            f64::NAN,
+            -f64::NAN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+        ] {
+            let mut weights = [0.5; 20];
+            weights[at] = bad;
+            let mut ancestors = [7; 20];
+            let refused = Resampling::Systematic.ancestors(&mut Stream::new(1).fast_rng(), &weights, &mut ancestors);
+            assert!(refused.is_err() && ancestors == [7; 20], "{bad} at {at}");
+        }
+        let mut weights = [0.5; 20];
+        weights[at] = -0.0;
+        assert!(!draw(Resampling::Systematic, 1, &weights, 20).contains(&(at as u32)));
+    }
+}

@@ -2,7 +2,7 @@
 //! bits.
 
 use fewbits_core::{BitString, FullValue, Gaussian, Link, Message, NumberFormat, Observation, OnAxes};
-use fewbits_filters::centre::{CentreState, Event, FusionCentre, Health, NoiseLearning, Reporting, Slot};
+use fewbits_filters::centre::{CentreState, Event, Failures, FusionCentre, Health, NoiseLearning, Reporting, Slot};
 use fewbits_filters::{
     BootstrapFilter, GridFilter, Imm, MomentFilter, PointMassFilter, RaoBlackwellised, ResamplingRule, StateFilter,
     UniformGrid,
@@ -176,4 +176,58 @@ fn a_centre_stored_between_prediction_and_update_goes_on_with_the_same_bits() {
     goes_on("bootstrap", || BootstrapFilter::new(particles(), 200).unwrap());
     goes_on("cloud", || RaoBlackwellised::new(particles(), 100).unwrap());
     goes_on("bank", || Imm::new(MomentFilter, vec![0.25, 1.0, 4.0], 0.05).unwrap());
+}
+
+/// A centre without tests takes a single report in fewer steps than one that keeps what it would need for late reports. Both are the same to
+/// the bit, whatever arrives.
+#[test]
+fn one_report_is_taken_as_one_of_many() {
+    let mut rng = Stream::new(3).fast_rng();
+    let made = |rng: &mut dyn Rng, window: f64, rate: f64| {
+        let world = ContinuousLinear::nearly_constant_velocity(0.1).unwrap();
+        let prior = Gaussian::new([0.0, 0.0].into(), nalgebra::Matrix2::identity() * 9.0).unwrap();
+        let failures = Failures {
+            rate,
+            ..Failures::default()
+        };
+        let mut centre = FusionCentre::new(rng, world, MomentFilter, &prior)
+            .unwrap()
+            .with_health(Health::Off)
+            .with_failures(failures)
+            .unwrap()
+            .with_window(window)
+            .unwrap();
+        for number in SENSORS {
+            let sensing = LinearSensor::scalar([1.0, 0.3].into(), 0.5).unwrap();
+            let link = Link::lossy(0.1).unwrap();
+            centre
+                .join(number, Reporting::values(sensing, FullValue::new(0.5).unwrap(), link))
+                .unwrap();
+        }
+        centre
+    };
+    for rate in [0.0, 0.01] {
+        let (mut short, mut long) = (made(&mut rng, 0.0, rate), made(&mut rng, 0.5, rate));
+        for step in 0..400 {
+            let slot = match step % 7 {
+                0 => wild(&mut rng),
+                _ => {
+                    let number = 3.0 * rng.sample::<f64, _>(StandardNormal) + 1e200 * f64::from(u8::from(step == 300));
+                    Slot::new(SENSORS[step % 3], BitString::default(), value(number))
+                }
+            };
+            let time = step as f64 * 0.3;
+            short.advance(&mut rng, time).unwrap();
+            long.advance(&mut rng, time).unwrap();
+            let (one, other) = (
+                short.receive(&mut rng, std::slice::from_ref(&slot)),
+                long.receive(&mut rng, std::slice::from_ref(&slot)),
+            );
+            assert_eq!(format!("{one:?}"), format!("{other:?}"), "step {step}");
+            assert_eq!(short.estimate(), long.estimate(), "step {step}");
+            for number in SENSORS {
+                assert_eq!(short.sensor(number).unwrap(), long.sensor(number).unwrap(), "step {step}");
+            }
+        }
+    }
 }

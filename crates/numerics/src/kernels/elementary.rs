@@ -80,6 +80,14 @@ pub(crate) fn exp_sum(high: f64, low: f64) -> f64 {
     fraction * power_of_two(first) * power_of_two(n - first)
 }
 
+/// [`exp`] of `x` with `|x| < 708`, whose result is neither subnormal nor infinite: the same bits in fewer steps.
+#[inline(always)]
+pub(crate) fn exp_normal(x: f64) -> f64 {
+    let n = (x * LOG2_E + ROUNDER) - ROUNDER;
+    let r = (x - n * LN_2_HIGH) - n * LN_2_LOW;
+    (1.0 + (r + r * r * polynomial(&EXP, r))) * power_of_two(n)
+}
+
 /// `exp(x)`: within one unit in the last place, subnormal results within one and a half; 0 and `+inf` beyond the range.
 #[inline(always)]
 pub fn exp(x: f64) -> f64 {

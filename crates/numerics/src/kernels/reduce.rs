@@ -9,6 +9,9 @@ pub const LANES: usize = 8;
 /// Elements that are processed together; a multiple of [`LANES`].
 const BLOCK: usize = 512;
 
+/// Below this distance from zero the exponential of a number is neither subnormal nor infinite.
+const ORDINARY: f64 = 700.0;
+
 /// Sum of the lanes, added in a fixed order.
 #[inline(always)]
 pub fn folded(lane: [f64; LANES]) -> f64 {
@@ -103,18 +106,18 @@ pub fn largest_number(a: &[f64]) -> Option<f64> {
         #[inline(always)]
         || {
             let chunks = a.chunks_exact(LANES);
-            let (mut lane, mut numbers) = ([f64::NEG_INFINITY; LANES], [true; LANES]);
+            let (mut lane, mut not_numbers) = ([f64::NEG_INFINITY; LANES], [0_u64; LANES]);
             for (j, x) in chunks.remainder().iter().enumerate() {
                 lane[j] = *x;
-                numbers[j] = !x.is_nan();
+                not_numbers[j] = u64::from(x.is_nan());
             }
             for chunk in chunks {
                 for j in 0..LANES {
                     lane[j] = if chunk[j] > lane[j] { chunk[j] } else { lane[j] };
-                    numbers[j] &= !chunk[j].is_nan();
+                    not_numbers[j] |= u64::from(chunk[j].is_nan());
                 }
             }
-            let all = numbers.into_iter().all(|n| n);
+            let all = not_numbers == [0; LANES];
             all.then(|| lane.into_iter().fold(f64::NEG_INFINITY, f64::max))
         },
     )
@@ -131,25 +134,39 @@ pub struct ExpSums {
 
 /// Writes `e_i = exp(logs[i] - offset)` to `out[i]` over the length of the shorter slice and returns `sum e_i` and `sum e_i^2` (weights,
 /// their total, and the sum that the effective sample size needs) in one pass.
+#[expect(clippy::neg_cmp_op_on_partial_ord, reason = "NaN is not ordinary")]
 pub fn exp_minus(logs: &[f64], offset: f64, out: &mut [f64]) -> ExpSums {
     vectorised(
         #[inline(always)]
         || {
             let count = logs.len().min(out.len());
             let (mut lane, mut square) = ([0.0; LANES], [0.0; LANES]);
-            // Blocks that stay in the first-level cache: one loop computes the exponentials, the next one adds them.
+            // Blocks that stay in the first-level cache. Two sums in one loop would not be in vector registers.
             for (out, logs) in out[..count].chunks_mut(BLOCK).zip(logs[..count].chunks(BLOCK)) {
-                for (out, log) in out.iter_mut().zip(logs) {
-                    *out = elementary::exp(log - offset);
+                let beyond = logs
+                    .iter()
+                    .fold(0, |all, log| all | u64::from(!((log - offset).abs() < ORDINARY)));
+                if beyond == 0 {
+                    for (out, log) in out.iter_mut().zip(logs) {
+                        *out = elementary::exp_normal(log - offset);
+                    }
+                } else {
+                    for (out, log) in out.iter_mut().zip(logs) {
+                        *out = elementary::exp(log - offset);
+                    }
                 }
                 let chunks = out.chunks_exact(LANES);
                 for (j, e) in chunks.remainder().iter().enumerate() {
                     lane[j] += e;
                     square[j] += e * e;
                 }
-                for chunk in chunks {
+                for chunk in chunks.clone() {
                     for j in 0..LANES {
                         lane[j] += chunk[j];
+                    }
+                }
+                for chunk in chunks {
+                    for j in 0..LANES {
                         square[j] += chunk[j] * chunk[j];
                     }
                 }
@@ -212,6 +229,32 @@ mod tests {
             assert!((sums.sum - sum(&values)).abs() <= 1e-12);
             assert!((sums.sum_of_squares - dot(&values, &values)).abs() <= 1e-11);
             assert!((log_sum_exp(&logs) - sum(&values).ln()).abs() < 1e-14 || count == 0);
+        }
+    }
+
+    /// Whether a block has ordinary numbers only or others too.
+    #[test]
+    fn weights_have_the_bits_of_the_exponential() {
+        let mut logs: Vec<f64> = (0..5 * BLOCK + 3)
+            .map(|i| 1398.0 * (i as f64 * 0.618).fract() - 699.0)
+            .collect();
+        let others = [
+            -700.0,
+            699.999_999,
+            708.5,
+            -744.9,
+            f64::NEG_INFINITY,
+            f64::NAN,
+            f64::INFINITY,
+        ];
+        for (at, other) in others.into_iter().enumerate() {
+            logs[2 * BLOCK + 70 * at] = other;
+        }
+        let mut out = vec![0.0; logs.len()];
+        exp_minus(&logs, 0.0, &mut out);
+        for (log, e) in logs.iter().zip(&out) {
+            let expected = elementary::exp(*log);
+            assert!(e.to_bits() == expected.to_bits() || e.is_nan() && expected.is_nan(), "exp({log})");
         }
     }
 
