@@ -118,32 +118,18 @@ impl SensorField {
         (response[0] + response[1]).max(0.0)
     }
 
-    /// Per age and sensor, and per free cell: standard deviation of the response over the cell, from those of its neighbours.
-    pub(crate) fn spreads(&self) -> Vec<Vec<Vec<f64>>> {
+    /// Per free cell and axis, the free cells before and after it; the cell itself where there is none.
+    pub(crate) fn neighbours(&self) -> Vec<[[usize; 2]; 3]> {
         let grid = self.domain.grid();
-        let neighbours = |cell: &usize| -> Vec<[Option<usize>; 2]> {
-            let at = grid.place(*cell);
-            let next = |axis, up| {
-                grid.next(at, axis, up)
-                    .and_then(|next| self.domain.number(grid.index(next)))
-            };
-            (0..grid.dimension())
-                .map(|axis| [false, true].map(|up| next(axis, up)))
-                .collect()
+        let next = |cell: usize, own: usize, axis: usize, up: bool| {
+            let next = grid
+                .next(grid.place(cell), axis, up)
+                .filter(|_| axis < grid.dimension());
+            next.and_then(|next| self.domain.number(grid.index(next)))
+                .unwrap_or(own)
         };
-        let neighbours: Vec<_> = self.domain.free().iter().map(neighbours).collect();
-        // Of a slope along each axis a uniform place in the cell has this variance. Next to a wall the slope is that to the other side.
-        let spread = |field: &Vec<f64>, own: usize| {
-            let along = neighbours[own].iter().map(|pair| {
-                let steps = pair.map(|next| next.map_or(0.0, |next| (field[next] - field[own]).abs()));
-                steps[0].max(steps[1]).powi(2) / 12.0
-            });
-            along.sum::<f64>().sqrt()
-        };
-        let of = |field: &Vec<f64>| (0..field.len()).map(|cell| spread(field, cell)).collect();
-        self.responses
-            .iter()
-            .map(|fields| fields.iter().map(of).collect())
+        let free = self.domain.free().iter().enumerate();
+        free.map(|(own, cell)| [0, 1, 2].map(|axis| [false, true].map(|up| next(*cell, own, axis, up))))
             .collect()
     }
 

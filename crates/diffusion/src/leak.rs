@@ -1,6 +1,7 @@
 //! Where a source is and when it began, from readings of a few bits at irregular times.
 
 use crate::leak_prior::{LeakPrior, Reading};
+use crate::leak_resolution::{Law, Offsets};
 use crate::{Domain, Error, Plan, SensorField};
 use fewbits_numerics::error::{finite, positive, refuse, within};
 use fewbits_numerics::normal::{cdf, interval, quantile};
@@ -9,8 +10,8 @@ use std::sync::Arc;
 /// The probability of every cell, start and rate of one leak, given readings of sensors of a [`SensorField`].
 ///
 /// Besides the sensor's noise, a reading's variance counts what the response changes across a cell and between two starts and rates: the
-/// resolution of the belief itself. Half of that variance is an error that all values of a sensor share, and that is estimated from them; words have
-/// errors of their own. The lasting relative error of each sensor ([`LeakPrior::model_error`]) is integrated out.
+/// resolution of the belief itself. What all values of a sensor share of it, where in the cell, between starts and between rates the truth is, is
+/// estimated from them to first order; words have errors of their own. The lasting relative error of each sensor ([`LeakPrior::model_error`]) is integrated out.
 ///
 /// ```
 /// use fewbits_diffusion::{Flow, LeakBelief, LeakPrior, Plan, Reading, Scheme, SensorField, StepControl, Transport};
@@ -46,14 +47,14 @@ pub struct LeakBelief {
     gains: Vec<f64>,
     faults: f64,
     log_volumes: Vec<f64>,
-    /// Per age and sensor, and per free cell: deviation of the response within the cell.
-    spreads: Vec<Vec<Vec<f64>>>,
+    /// Per free cell and axis, the free cells before and after it; the cell itself where there is none.
+    neighbours: Vec<[[usize; 2]; 3]>,
     /// Per sensor that reported: the log-likelihood of all its readings by cell, start and rate.
     logs: Vec<Option<Vec<f64>>>,
     /// The same with the sensor's error integrated out; only rates of the prior.
     shared: Vec<Option<Vec<f64>>>,
-    /// Per sensor whose values came, by cell, start and rate: mean and variance of the part of the error of resolution that its values share.
-    common: Vec<Option<Vec<(f64, f64)>>>,
+    /// Per sensor whose values came: the part of the error of resolution that its values share.
+    offsets: Vec<Option<Offsets>>,
     surprise: f64,
     variance: f64,
 }
@@ -61,10 +62,10 @@ pub struct LeakBelief {
 /// Number of starts and of rates of the belief.
 const STARTS: usize = 12;
 const RATES: usize = 24;
-/// Share of the variance of the error of resolution that all values of a sensor have in common.
-const COMMON: f64 = 0.5;
 /// Deviation of a uniform distribution of width 1.
 const UNIFORM: f64 = 0.288_675_134_594_812_9;
+/// Root of the mean square of half the square of a number that is uniform in a width of 1.
+const BEND: f64 = 0.055_901_699_437_494_74;
 
 impl LeakBelief {
     /// The belief before the first reading.
@@ -96,12 +97,12 @@ impl LeakBelief {
         let volumes = domain.volumes();
         let all: f64 = volumes.iter().sum();
         Ok(Self {
-            spreads: field.spreads(),
+            neighbours: field.neighbours(),
             log_volumes: volumes.iter().map(|volume| (volume / all).ln()).collect(),
             log_rates: (0..RATES + 2 * reach).map(rate).collect(),
             logs: vec![None; field.sensor_count()],
             shared: vec![None; field.sensor_count()],
-            common: vec![None; field.sensor_count()],
+            offsets: vec![None; field.sensor_count()],
             faults: prior.faults,
             domain,
             field,
@@ -130,15 +131,15 @@ impl LeakBelief {
         let predicted = |p: &[f64]| weights.iter().zip(p).map(|(weight, p)| weight * p).sum::<f64>();
         let (own, tested) = match reading {
             Reading::Value(value) => {
-                let mut common = self.common[sensor]
+                let mut offsets = self.offsets[sensor]
                     .take()
-                    .unwrap_or_else(|| vec![(0.0, 1.0); resolved.len()]);
+                    .unwrap_or_else(|| Offsets::new(resolved.len(), self.domain.grid().dimension()));
                 let laws: Vec<(f64, f64)> = resolved
                     .iter()
-                    .zip(&common)
-                    .map(|((mean, error), (known, left))| {
-                        let variance = deviation * deviation + error * error * (1.0 - COMMON + COMMON * left);
-                        (mean + COMMON.sqrt() * error * known, variance.sqrt())
+                    .enumerate()
+                    .map(|(i, law)| {
+                        let (mean, variance) = offsets.predicted(i, law);
+                        (mean, (variance + deviation * deviation).sqrt())
                     })
                     .collect();
                 let standard = |(mean, deviation): &(f64, f64)| (value - mean) / deviation;
@@ -149,22 +150,20 @@ impl LeakBelief {
                 };
                 let below: Vec<f64> = laws.iter().map(|law| cdf(standard(law))).collect();
                 let share = predicted(&below).clamp(1e-12, 1.0 - 1e-12);
-                for (((_, error), law), (known, left)) in resolved.iter().zip(&laws).zip(&mut common) {
+                for (i, (law, known)) in resolved.iter().zip(&laws).enumerate() {
                     // A faulty value tells nothing of the error.
-                    let density = (1.0 - self.faults) * (-0.5 * standard(law).powi(2)).exp() / law.1;
+                    let density = (1.0 - self.faults) * (-0.5 * standard(known).powi(2)).exp() / known.1;
                     let right = density / (density + self.faults / wide).max(f64::MIN_POSITIVE);
-                    let gain = right * COMMON.sqrt() * error * *left / law.1;
-                    *known += gain * standard(law);
-                    *left *= 1.0 - gain * COMMON.sqrt() * error / law.1;
+                    offsets.update(i, law, value - known.0, known.1 * known.1, right);
                 }
-                self.common[sensor] = Some(common);
+                self.offsets[sensor] = Some(offsets);
                 // Its quantile is normal under the right model; the square has mean 1 and variance 2.
                 (laws.iter().map(log).collect::<Vec<f64>>(), (quantile(share).powi(2) - 1.0, 2.0))
             }
             Reading::Word { edges, word } => {
                 let laws: Vec<(f64, f64)> = resolved
                     .iter()
-                    .map(|(mean, error)| (*mean, deviation.hypot(*error)))
+                    .map(|law| (law.mean, deviation.hypot(law.error())))
                     .collect();
                 // Probabilities to be below each edge, and to be above it.
                 let tails = edges.iter().map(|edge| {
@@ -216,8 +215,8 @@ impl LeakBelief {
             .fold(f64::MIN_POSITIVE, f64::max)
     }
 
-    /// Mean of what a sensor measures at a time, and the deviation of its error of resolution, by cell, start and rate.
-    fn resolved(&self, sensor: usize, time: f64) -> Vec<(f64, f64)> {
+    /// What a sensor measures at a time, by cell, start and rate.
+    fn resolved(&self, sensor: usize, time: f64) -> Vec<Law> {
         let width = self.starts.get(1).map_or(0.0, |next| next - self.starts[0]);
         let step = self.log_rates[1] - self.log_rates[0];
         let rates: Vec<f64> = self.log_rates.iter().map(|log| log.exp()).collect();
@@ -227,16 +226,30 @@ impl LeakBelief {
             .map(|start| [0.0, -0.5, 0.5].map(|by| self.field.about(time - start + by * width)))
             .collect();
         let mut laws = Vec::with_capacity(self.log_volumes.len() * self.starts.len() * rates.len());
-        for cell in 0..self.log_volumes.len() {
+        for (cell, neighbours) in self.neighbours.iter().enumerate() {
             for ages in &about {
                 let [response, before, after] = ages.map(|about| self.field.response_at(about, sensor, cell));
-                let across: f64 = ages[0]
-                    .iter()
-                    .map(|(age, share)| share * self.spreads[*age][sensor][cell])
-                    .sum();
-                let relative =
-                    across.powi(2) + (UNIFORM * (after - before)).powi(2) + (UNIFORM * step * response).powi(2);
-                laws.extend(rates.iter().map(|rate| (rate * response, rate * relative.sqrt())));
+                let mut slopes = [UNIFORM * step * response, UNIFORM * (after - before), 0.0, 0.0, 0.0];
+                let mut bends = [
+                    step * step * response,
+                    4.0 * (after + before - 2.0 * response),
+                    0.0,
+                    0.0,
+                    0.0,
+                ];
+                for (axis, pair) in neighbours.iter().enumerate() {
+                    let [down, up] = pair.map(|next| self.field.response_at(ages[0], sensor, next) - response);
+                    // Next to a wall the slope is that to the other side.
+                    let cells = if pair.contains(&cell) { 1.0 } else { 2.0 };
+                    slopes[2 + axis] = UNIFORM * (up - down) / cells;
+                    bends[2 + axis] = up + down;
+                }
+                let curvature = BEND * bends.iter().map(|bend: &f64| bend * bend).sum::<f64>().sqrt();
+                laws.extend(rates.iter().map(|rate| Law {
+                    mean: rate * response,
+                    slopes: slopes.map(|slope| rate * slope),
+                    curvature: rate * curvature,
+                }));
             }
         }
         laws

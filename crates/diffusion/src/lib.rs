@@ -53,6 +53,7 @@ pub mod gaden;
 mod grid;
 mod leak;
 mod leak_prior;
+mod leak_resolution;
 mod plan;
 mod solver;
 mod steady;

@@ -12,8 +12,8 @@ use std::path::Path;
 /// Ages of a response: so many between the longest and this share of it, each larger than the one before by the same factor.
 const AGES: usize = 20;
 const SHORTEST: f64 = 0.005;
-/// Largest number of cells times sensors: the belief of these takes about 1 GiB.
-const MOST_CELLS: usize = 200_000;
+/// Largest number of cells times sensors: the belief of these takes about 3 GiB if all send values.
+const MOST_CELLS: usize = 50_000;
 
 /// Content of `rooms.toml`.
 #[derive(Deserialize)]

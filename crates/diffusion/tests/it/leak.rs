@@ -256,3 +256,61 @@ fn bad_readings_and_priors_are_refused() {
     let total: f64 = belief.cells().iter().sum();
     assert!((total - 1.0).abs() < 1e-12 && belief.misfit() == 1.0);
 }
+
+/// One cell, one start: a value lies between two of the 24 rates, and many accurate values of a sensor share what the nearer rate is off by. The
+/// truth is an integral over that offset on a grid.
+#[test]
+fn many_accurate_values_do_not_name_one_rate_of_the_grid() {
+    let domain = Plan::parse("###\n#a#\n###\na = room")
+        .unwrap()
+        .domain(1.0, 1, 0.0)
+        .unwrap();
+    let still = Flow::still(&domain);
+    let transport = Transport::new(domain, 0.02, &still, 1e-3, Scheme::default()).unwrap();
+    let at = [[1.5, 1.5, 0.0]];
+    let field = SensorField::transient(&transport, &at, &[1000.0], StepControl::Tolerance(1e-3)).unwrap();
+    let (response, step) = (field.response(0, 0).unwrap()[0], f64::ln(100.0) / 24.0);
+    let prior = LeakPrior {
+        start: [0.0, 0.0],
+        rate: [1e-7, 1e-5],
+        model_error: 0.0,
+        faults: 0.0,
+    };
+    let rates: Vec<f64> = (0..24).map(|i| 1e-7 * ((f64::from(i) + 0.5) * step).exp()).collect();
+    let (noise, truth) = (0.03 * rates[12] * response, rates[12] * (0.5 * step).exp() * response);
+    let (mut belief, mut draws) = (LeakBelief::new(field, &prior).unwrap(), Draws(11));
+    let values: Vec<f64> = (0..40).map(|_| truth + noise * draws.normal()).collect();
+    for value in &values {
+        belief.observe(0, 2000.0, &Reading::Value(*value), noise).unwrap();
+    }
+    // A place in a step is uniform: its variance is a twelfth, that of half its square about 0 an 80th of a quarter.
+    let log_of = |rate: &f64| -> f64 {
+        let (mean, slope) = (rate * response, rate * response * step / 12.0_f64.sqrt());
+        let own = noise * noise + 0.05 * slope * slope + (rate * response * step * step).powi(2) / 320.0;
+        let at = |k: i32| {
+            let offset = f64::from(k) * 0.002;
+            let squares: f64 = values
+                .iter()
+                .map(|z| (z - mean - offset * slope).powi(2) / own + own.ln())
+                .sum();
+            -0.5 * (squares + offset * offset)
+        };
+        let logs: Vec<f64> = (-4000..=4000).map(at).collect();
+        let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        most + logs.iter().map(|log| (log - most).exp()).sum::<f64>().ln()
+    };
+    let logs: Vec<f64> = rates.iter().map(log_of).collect();
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = logs.iter().map(|log| (log - most).exp()).sum();
+    let p: Vec<f64> = logs.iter().map(|log| (log - most).exp() / total).collect();
+    let mean: f64 = p.iter().zip(&rates).map(|(p, rate)| p * rate.ln()).sum();
+    let variance: f64 = p
+        .iter()
+        .zip(&rates)
+        .map(|(p, rate)| p * (rate.ln() - mean).powi(2))
+        .sum();
+    let (found, deviation) = belief.log_rate();
+    assert!(p[12] > 0.1 && p[13] > 0.1, "{p:?}");
+    assert!((found - mean).abs() < 1e-6 * step, "{found} {mean}");
+    assert!((deviation - (variance + step * step / 12.0).sqrt()).abs() < 1e-6 * step, "{deviation}");
+}

@@ -74,6 +74,8 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         self.history.truncate(from);
         self.history.extend(replayed);
         self.belief = belief;
+        let unreadable = readings.iter().filter(|reading| reading.is_unreadable());
+        unreadable.for_each(|reading| self.members[reading.seat].state.unreadable += 1);
         copied.iter().for_each(|seat| self.members[*seat].state.copies += 1);
         rejected.iter().for_each(|seat| self.members[*seat].state.rejected += 1);
         Ok(true)

@@ -26,6 +26,7 @@
 
 mod alternative;
 mod by_value;
+mod constant_noise;
 mod gate;
 mod health;
 mod judge;
@@ -45,6 +46,7 @@ mod state;
 mod together;
 mod window;
 
+pub use constant_noise::ConstantNoise;
 pub use fewbits_core::Event;
 pub use health::{FalseAlarms, Health};
 pub use learning::NoiseLearning;
@@ -303,6 +305,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             excluded: state.excluded || (state.repeats.is_stuck && self.health == Health::Exclude),
             disputed: state.disputed,
             rejected: state.rejected,
+            unreadable: state.unreadable,
             copies: state.copies,
             surprise: state.rate.score(),
         })

@@ -35,6 +35,11 @@ pub(super) enum Content {
 }
 
 impl<'a, const D: usize> Reading<'a, D> {
+    /// Whether bits came that are no report of the scheme.
+    pub(crate) fn is_unreadable(&self) -> bool {
+        self.content == Content::Lost && self.slot.observation.received().is_some()
+    }
+
     /// The likelihood of a reading that is known to have one.
     pub(crate) fn known(&self) -> Option<&dyn Likelihood<D>> {
         self.likelihood.as_deref()

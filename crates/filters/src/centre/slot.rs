@@ -49,6 +49,8 @@ pub struct SensorState {
     pub disputed: bool,
     /// Number of its reports that were not used because they were impossible or too unlikely.
     pub rejected: u64,
+    /// Number of its reports that are no report of its scheme, of another length for example. They show that it works, and update nothing.
+    pub unreadable: u64,
     /// Number of copies of its reports that were dropped.
     pub copies: u64,
     /// Of a sensor that sends one bit: by how many standard deviations unlikely bits came more often than predicted. Above about 4 its noise or

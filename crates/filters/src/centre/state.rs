@@ -40,11 +40,18 @@ pub(super) struct MemberState {
     /// Number of reports that were rejected, in all and since the last that was not.
     pub rejected: u64,
     pub astray: u32,
+    /// Number of reports that are none of the scheme.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub unreadable: u64,
     /// Number of copies of reports that were dropped.
     pub copies: u64,
     pub repeats: Repeats,
     #[serde(default, skip_serializing_if = "Rate::is_empty")]
     pub rate: Rate,
+}
+
+fn is_zero(count: &u64) -> bool {
+    *count == 0
 }
 
 impl MemberState {
@@ -60,6 +67,7 @@ impl MemberState {
             depth: 0.0,
             rejected: 0,
             astray: 0,
+            unreadable: 0,
             copies: 0,
             repeats: Repeats::new(),
             rate: Rate::default(),
@@ -203,8 +211,19 @@ impl<B: DeserializeOwned> CentreState<B> {
         let plain = CentreState::of_plain_bytes(bytes)?;
         match plain.map(|belief| belief.deserialized()) {
             Ok(state) => Ok(state),
-            Err(error) => refuse("bytes", error, expected()),
+            Err(ciborium::value::Error::Custom(reason)) => refuse("bytes", reason, expected()),
         }
+    }
+}
+
+/// What is wrong with bytes that are no state.
+fn reason(error: &ciborium::de::Error<std::io::Error>, bytes: usize) -> String {
+    use ciborium::de::Error::{Io, RecursionLimitExceeded, Semantic, Syntax};
+    match error {
+        Io(_) => format!("{bytes} bytes that end within a value"),
+        Syntax(at) => format!("{bytes} bytes with an unknown one at {at}"),
+        Semantic(_, text) => text.clone(),
+        RecursionLimitExceeded => format!("{bytes} bytes nested too deeply"),
     }
 }
 
@@ -231,7 +250,7 @@ impl CentreState<Value> {
         match ciborium::from_reader(&mut rest) {
             Ok(state) if rest.is_empty() => Ok(state),
             Ok(_) => refuse("bytes", format!("{} bytes too many", rest.len()), expected()),
-            Err(error) => refuse("bytes", error, expected()),
+            Err(error) => refuse("bytes", reason(&error, bytes.len()), expected()),
         }
     }
 }

@@ -543,6 +543,34 @@ fn a_burst_of_wild_values_reopens_nothing() {
     }
 }
 
+/// Defect: nothing told that all reports of a sensor have another length than its scheme, which is what a wrong format looks like.
+#[test]
+fn reports_of_wrong_length_are_counted_and_stored() {
+    let mut rng = Stream::new(8).rng();
+    let mut centre = centre(MomentFilter, 2, 0.1, &mut rng).with_window(10.0).unwrap();
+    let bytes_before = centre.state().to_bytes().unwrap();
+    let short = |sensor| {
+        let bits = fewbits_core::BitString::from_bytes(vec![7, 7, 7], 24).unwrap();
+        Slot::new(sensor, fewbits_core::BitString::default(), Observation::Received(bits))
+    };
+    let mut told = centre.state();
+    for k in 1..=3 {
+        centre.advance(&mut rng, f64::from(k)).unwrap();
+        centre.receive(&mut rng, &[short(0), slot(1, 0.1)]).unwrap();
+        told = CentreState::from_bytes(&centre.state().to_bytes().unwrap()).unwrap();
+    }
+    centre.late(&mut rng, 2.0, &[short(1)]).unwrap();
+    let counts =
+        |centre: &FusionCentre<1, MomentFilter>| [0, 1].map(|number| centre.sensor(number).unwrap().unreadable);
+    assert_eq!(counts(&centre), [3, 1]);
+    centre.restore(told).unwrap();
+    assert_eq!(counts(&centre), [3, 0]);
+    // Bytes that end early are told in words.
+    let cut = &bytes_before[..bytes_before.len() - 3];
+    let error = CentreState::<Gaussian<1>>::from_bytes(cut).unwrap_err().to_string();
+    assert!(error.contains("end within a value") && !error.contains('{') && !error.contains("Io("), "{error}");
+}
+
 #[test]
 fn a_copy_of_a_report_is_dropped_and_counted() {
     let mut rng = Stream::new(8).rng();

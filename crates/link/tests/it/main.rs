@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod attacks;
+mod c_envelope;
 mod floods;
 mod followed;
 mod hellos;
