@@ -17,9 +17,14 @@ pub(crate) struct RangesOptions {
     #[arg(long, default_value = "value", value_name = "WHAT")]
     pub(crate) send: String,
     /// Largest standard deviation of a range's error that is considered; it is estimated from a quarter of that on. Default: about a quarter
-    /// of the distance of the anchors from their middle, and estimated from a hundredth of that on.
+    /// of the distance of the anchors from their middle, and estimated from a hundredth of that on. A share, as `40%`: errors grow with the
+    /// distance, and `--bias` and `--anchor-bias` are shares of it too; taken where the first ranges of a file say so.
     #[arg(long, value_name = "DEVIATION")]
-    pub(crate) noise: Option<f64>,
+    pub(crate) noise: Option<String>,
+    /// Values are signal strengths in dBm: the level at a distance of 1, the exponent of the distance, and the deviation of the shadowing in
+    /// dB, as `-59,2.2,4`. A few dB, a tenth of the exponent, and half or twice the shadowing may be wrong.
+    #[arg(long, value_name = "LEVEL,EXPONENT,SHADOWING", allow_hyphen_values = true)]
+    pub(crate) rssi: Option<String>,
     /// Standard deviation of the velocity along an axis, per second; a factor of four off is enough. With `--odometry` that of its error. Default:
     /// estimated.
     #[arg(long, value_name = "SPEED")]

@@ -65,6 +65,8 @@ pub use fewbits_core::{Error, RangeNoise};
 pub use fewbits_filters::GridFilter;
 pub use loading::optimal_loading;
 pub use quantized::{QuantizedRange, RangeReference};
-pub use ranges::{Height, Mistake, RangeEstimate, RangeSettings, RangeTracker, Travel, height_of, mistake_of};
+pub use ranges::{
+    Height, Mistake, RangeEstimate, RangeSettings, RangeTracker, Travel, height_of, mistake_of, proportion_of,
+};
 pub use sensor::RangeSensor;
 pub use {nalgebra, rand};

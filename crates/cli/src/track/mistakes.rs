@@ -1,7 +1,7 @@
 //! Mistakes of tables that `ranges` tells.
 
 use crate::numbers::short;
-use fewbits_pf_mpa::{Mistake, RangeSettings, mistake_of};
+use fewbits_pf_mpa::{Mistake, RangeSettings, mistake_of, proportion_of};
 use nalgebra::Vector3;
 
 /// Ranges from which a mistake is found.
@@ -32,18 +32,30 @@ pub(super) fn limited(first: &[(f64, usize, f64)]) -> Option<String> {
     ))
 }
 
+/// Ranges with the names of their anchors.
+fn named<'a>(anchors: &'a [(String, Vector3<f64>)], first: &[(f64, usize, f64)]) -> Vec<(f64, &'a str, f64)> {
+    let name = |anchor: usize| anchors.get(anchor).map(|(name, _)| name.as_str());
+    let named = |(time, anchor, range): &(f64, usize, f64)| Some((*time, name(*anchor)?, *range));
+    first.iter().filter_map(named).collect()
+}
+
+/// What to do about errors that grow with the distance.
+pub(super) fn proportion(
+    anchors: &[(String, Vector3<f64>)],
+    settings: RangeSettings,
+    first: &[(f64, usize, f64)],
+) -> Option<String> {
+    let (noise, _) = proportion_of(anchors, settings, &named(anchors, first)).ok()??;
+    Some(grows(noise, "as"))
+}
+
 /// What to do about the mistake that explains the first ranges, if there is one.
 pub(super) fn mistake(
     anchors: &[(String, Vector3<f64>)],
     settings: RangeSettings,
     first: &[(f64, usize, f64)],
 ) -> Option<String> {
-    let name = |anchor: usize| anchors.get(anchor).map(|(name, _)| name.as_str());
-    let ranges: Vec<(f64, &str, f64)> = first
-        .iter()
-        .filter_map(|(time, anchor, range)| Some((*time, name(*anchor)?, *range)))
-        .collect();
-    let found = mistake_of(anchors, settings, &ranges).ok()??;
+    let found = mistake_of(anchors, settings, &named(anchors, first)).ok()??;
     let what = match found {
         Mistake::Swapped(one, other) => {
             format!("anchors {one} and {other} had each other's place: exchange their names in the table of anchors")
@@ -62,4 +74,12 @@ pub(super) fn mistake(
         _ => return None,
     };
     Some(format!("the first ranges are as if {what}"))
+}
+
+/// What is said of errors that grow with the distance.
+pub(super) fn grows(noise: f64, taken: &str) -> String {
+    let (noise, largest) = (short(100.0 * noise), (200.0 * noise).ceil());
+    format!(
+        "errors grow with the distance, {noise} % of it: {taken} --noise {largest}% says; a --noise without % leaves it out, and --rssi takes strengths in dBm"
+    )
 }

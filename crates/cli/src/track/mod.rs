@@ -26,7 +26,8 @@
 //! | `ranges` | the task `ranges`: a place |
 //! | `anchors`, `odometry`, `path` | the table of its anchors, the columns of what the target moved, the picture |
 //! | `leak`, `leak_rooms` | the task `leak`: a room, and the file of rooms |
-//! | `height` | the height of its target |
+//! | `range_settings` | its options as settings, the law of signal strengths |
+//! | `told` | what its first ranges tell: height, and errors that grow |
 
 mod anchors;
 mod applied;
@@ -39,7 +40,6 @@ mod first;
 mod fit;
 mod followed;
 mod found;
-mod height;
 mod held;
 mod hints;
 mod instant;
@@ -56,6 +56,7 @@ mod mistakes;
 mod odometry;
 mod path;
 mod picture;
+mod range_settings;
 mod ranges;
 mod remote;
 mod report;
@@ -68,6 +69,7 @@ mod settings;
 mod stuck;
 mod summary;
 mod targets;
+mod told;
 mod transform;
 mod units;
 mod world;
@@ -83,7 +85,7 @@ use rows::Instants;
 /// Runs the task.
 pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {
     match (options.model, &options.anchors) {
-        (Some(Model::Ranges), Some(anchors)) => ranges(&ranges::options(options, anchors)?),
+        (Some(Model::Ranges), Some(anchors)) => ranges(&range_settings::options(options, anchors)?),
         (_, Some(_)) => Err(Error::Needed {
             option: "--model ranges",
             reason: "--anchors says where ranges are measured from",

@@ -2,22 +2,24 @@
 
 use super::anchors::Anchor;
 use super::divisor::common_divisor;
-use super::height::height_found;
 use super::instant::Instant;
-use super::mistakes::{FIRST_RANGES, limited, mistake};
+use super::mistakes::{FIRST_RANGES, limited, mistake, proportion};
 use super::odometry::Odometry;
 use super::path;
+use super::range_settings::{Strengths, settings};
 use super::report::{first_cell, first_name, summarise};
 use super::rows::Instants;
 use super::sensors;
+use super::told::take_told;
 use crate::Ending;
-use crate::arguments::{RangesOptions, TrackOptions};
+use crate::arguments::RangesOptions;
 use crate::error::Error;
-use crate::numbers::{number, short};
+use crate::files::is_regular;
+use crate::numbers::short;
 use crate::output::{Cell, Shape, Sheet};
 use crate::plot::Thinned;
 use crate::report::Report;
-use fewbits_pf_mpa::{Height, RangeEstimate, RangeSettings, RangeTracker, Travel};
+use fewbits_pf_mpa::{RangeEstimate, RangeSettings, RangeTracker, Travel};
 use serde::Serialize;
 
 /// Most ranges longer than the anchors are apart by this factor, or shorter, have another unit.
@@ -52,62 +54,12 @@ struct AnchorSummary {
     ranges: usize,
     /// Probability at the end that its ranges depend on the distance.
     works: f64,
+    /// Mean product of its successive residuals in their deviations, if it is far above zero: its place, or the law of its ranges, is wrong.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lasting: Option<f64>,
     /// The bias that it has alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     own_bias: Option<f64>,
-}
-
-/// The options of `ranges` that those of `track --model ranges` stand for.
-pub(super) fn options(track: &TrackOptions, anchors: &str) -> Result<RangesOptions, Error> {
-    if track.reports {
-        return Err(Error::option("--reports", "--model ranges", "measured ranges, which this command quantizes"));
-    }
-    const EXPECTED: &str = "one standard deviation for all anchors";
-    let noise = (!track.noise.is_empty())
-        .then(|| number("--noise", &track.noise, EXPECTED))
-        .transpose()?;
-    Ok(RangesOptions {
-        table: track.table.clone(),
-        many: track.many.clone(),
-        anchors: anchors.to_owned(),
-        send: track.send.clone(),
-        noise,
-        speed: track.speed,
-        bias: None,
-        anchor_bias: None,
-        scale: RangeSettings::default().scale,
-        height: None,
-        unknown_clock: false,
-        odometry: Vec::new(),
-        persistence: track.persistence,
-        outliers: track.outliers,
-        silence: RangeSettings::default().silence,
-        late: track.late,
-        plot: track.plot.clone(),
-        json: track.json,
-        output: track.output.clone(),
-    })
-}
-
-fn settings(options: &RangesOptions) -> Result<RangeSettings, Error> {
-    const EXPECTED: &str = "a height as `0.3`";
-    let height = match options.height.as_deref() {
-        None => Height::Unsaid,
-        Some(text) => Height::Known(number("--height", text, EXPECTED)?),
-    };
-    Ok(RangeSettings {
-        noise: options.noise,
-        speed: options.speed,
-        bias: options.bias,
-        anchor_bias: options.anchor_bias,
-        scale: options.scale,
-        outliers: options.outliers,
-        persistence: options.persistence,
-        silence: options.silence,
-        height,
-        unknown_clock: options.unknown_clock,
-        ..RangeSettings::default()
-    })
 }
 
 /// Names of the columns behind the first.
@@ -149,23 +101,8 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
     let refused = Error::refused("the tracker of ranges is refused");
     let mut settings = settings(options)?;
     let mut hints = instants.roles.told.clone();
-    let is_flat = anchors.iter().all(|(_, place)| place.z == 0.0);
-    if let Some(height) = height_found(options, anchors, settings, &mut instants)? {
-        settings.height = Height::Known(height);
-        let height = short(height);
-        hints.push(if is_flat {
-            format!(
-                "the ranges say that the target is {height} higher or lower than the anchors: taken, as --height {height} says; --height 0 leaves it out"
-            )
-        } else {
-            format!("the ranges say that the target is at the height {height}: taken, as --height {height} says")
-        });
-    } else if !is_flat && options.height.is_none() {
-        return Err(Error::Needed {
-            option: "--height",
-            reason: "the anchors have heights, and the first ranges do not tell that of the target",
-        });
-    }
+    let strengths = Strengths::of(options)?;
+    hints.extend(take_told(options, anchors, &mut settings, &mut instants)?);
     let mut tracker = RangeTracker::new(anchors.iter().cloned(), travel, settings).map_err(refused)?;
     let known = |name: &str| anchors.iter().position(|(known, _)| known == name);
     let odometry = Odometry::new(options, anchors, &instants)?;
@@ -196,6 +133,7 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
                 ranges: 0,
                 works: 1.0,
                 own_bias: None,
+                lasting: None,
             })
             .collect(),
     };
@@ -222,7 +160,8 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
             let Some(anchor) = known(name) else {
                 return Err(unknown(instants.file(), name, file));
             };
-            if range < 0.0 && !options.unknown_clock {
+            let range = strengths.map_or(range, |strengths| strengths.distance(range));
+            if range < 0.0 && !options.unknown_clock || range == 0.0 && settings.proportional {
                 summary.negative += 1;
                 continue;
             }
@@ -278,10 +217,11 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
     (summary.bits, summary.losses) = (tracker.bits(), tracker.losses());
     summary.bits_per_range = summary.bits as f64 / (summary.ranges as f64).max(1.0);
     for anchor in &mut summary.anchors {
+        let (name, refused) = (&anchor.name, Error::refused("an anchor is refused"));
         let asked = tracker
-            .works(&anchor.name)
-            .and_then(|works| Ok((works, tracker.own_bias(&anchor.name)?)));
-        (anchor.works, anchor.own_bias) = asked.map_err(Error::refused("an anchor is refused"))?;
+            .works(name)
+            .and_then(|works| Ok((works, tracker.own_bias(name)?, tracker.lasting_residuals(name)?)));
+        (anchor.works, anchor.own_bias, anchor.lasting) = asked.map_err(refused)?;
     }
     if summary.rows == 0 {
         return Err(Error::empty(instants.file(), "rows"));
@@ -304,14 +244,17 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
         ));
     }
     summary.hints.extend(limited(&first));
-    let is_wrong = |one: &AnchorSummary| one.works < 0.5 || one.own_bias.is_some();
+    if !is_regular(&options.table.file) {
+        summary.hints.extend(proportion(anchors, settings, &first));
+    }
+    let is_wrong = |one: &AnchorSummary| one.works < 0.5 || one.own_bias.is_some() || one.lasting.is_some();
     let is_suspect =
         summary.losses > 0 || OFTEN * summary.doubtful > summary.rows || summary.anchors.iter().any(is_wrong);
     if is_suspect {
         summary.hints.extend(mistake(anchors, settings, &first));
     }
     let own = rounding / 12.0_f64.sqrt();
-    if own > noise && options.anchor_bias.is_none() {
+    if own > noise && options.anchor_bias.is_none() && !settings.proportional {
         let (step, own) = (short(rounding), short(own));
         summary.hints.push(format!(
             "ranges are multiples of {step}: if they are rounded, their errors last while the target rests, and --anchor-bias {own} makes the band hold them"
@@ -322,7 +265,7 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
             .hints
             .push(format!("{} copies of reports were dropped", instants.copies));
     }
-    let lines = lines(&summary, &tracker, options.silence);
+    let lines = lines(&summary, &tracker, settings);
     summarise(&summary, &lines, options.json)?;
     Ok(Ending::Good)
 }
@@ -335,7 +278,8 @@ fn farthest(anchors: &[Anchor]) -> f64 {
     pairs.fold(0.0, f64::max)
 }
 
-fn lines(summary: &Summary, tracker: &RangeTracker, silence: f64) -> Vec<String> {
+fn lines(summary: &Summary, tracker: &RangeTracker, settings: RangeSettings) -> Vec<String> {
+    let silence = settings.silence;
     let mut lines = vec![
         format!("{} rows, {} ranges of {:.2} bits on average", summary.rows, summary.ranges, summary.bits_per_range),
         format!("{} rows without a place, track lost {} times", summary.searching, summary.losses),
@@ -353,7 +297,7 @@ fn lines(summary: &Summary, tracker: &RangeTracker, silence: f64) -> Vec<String>
     }
     if summary.negative > 0 && summary.ranges == 0 {
         lines.push(format!(
-            "all {} values are negative: they are no distances. Signal strengths in dBm must be made distances first; differences of ranges need --unknown-clock",
+            "all {} values are negative: they are no distances. Signal strengths in dBm need --rssi; differences of ranges need --unknown-clock",
             summary.negative
         ));
     } else if summary.negative > 0 {
@@ -376,12 +320,29 @@ fn lines(summary: &Summary, tracker: &RangeTracker, silence: f64) -> Vec<String>
             lines.push(format!("anchor {} contradicts the others and is not used", anchor.name));
         } else if let Some(bias) = anchor.own_bias {
             let off = if bias > 0.0 { "long" } else { "short" };
-            lines.push(format!(
-                "ranges of anchor {} are {} too {off}, as if it stood elsewhere or were behind a wall: they are used less that",
-                anchor.name,
+            let size = if settings.proportional {
+                format!("{} %", short(100.0 * bias.abs().exp_m1()))
+            } else {
                 short(bias.abs())
+            };
+            lines.push(format!(
+                "ranges of anchor {} are {size} too {off}, as if it stood elsewhere or were behind a wall: they are used less that",
+                anchor.name
             ));
         }
+    }
+    let lasting: Vec<(&str, f64)> = summary
+        .anchors
+        .iter()
+        .filter_map(|one| Some((one.name.as_str(), one.lasting?)))
+        .collect();
+    if !lasting.is_empty() {
+        let most = lasting.iter().fold(0.0_f64, |most, (_, product)| most.max(*product));
+        let names: Vec<&str> = lasting.iter().map(|(name, _)| *name).collect();
+        lines.push(format!(
+            "errors of anchors {} last from range to range (mean product of neighbours up to {most:.2} of their variance), so bands are too narrow: an anchor stands elsewhere than its table says, or walls lengthen ranges",
+            names.join(", ")
+        ));
     }
     lines
 }

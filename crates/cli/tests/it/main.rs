@@ -22,6 +22,7 @@ mod numbers;
 mod outputs;
 mod pages;
 mod ranges;
+mod ranges_strengths;
 mod ranges_tables;
 mod recordings;
 mod streams;

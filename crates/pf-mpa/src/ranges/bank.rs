@@ -232,7 +232,7 @@ impl Hypothesis {
             if self.weights[i] == 0.0 {
                 continue;
             }
-            filter.range(place, above, anchor, out);
+            filter.range(known.measured, place, above, anchor, out);
             let noise = known.noises[i % noises];
             mean += self.weights[i] * out.mean;
             square += self.weights[i] * (out.variance + noise * noise);
@@ -254,7 +254,7 @@ impl Hypothesis {
             if *weight == 0.0 {
                 continue;
             }
-            filter.range(place, place[2] - known.level, anchor, &mut out);
+            filter.range(known.measured, place, place[2] - known.level, anchor, &mut out);
             let bias = filter.mean[filter.bias()] + range - out.mean;
             filter.forget_bias(bias, deviation * deviation);
         }

@@ -27,6 +27,11 @@ impl Search<'_> {
         self.known.axes
     }
 
+    /// What is measured of the distance.
+    pub(super) fn measured(&self, point: &[f64], one: &Collected) -> f64 {
+        self.known.measured.of(self.distance(point, one))
+    }
+
     pub(super) fn distance(&self, point: &[f64], one: &Collected) -> f64 {
         let squares: f64 = (0..self.axes()).map(|i| (point[i] - one.place[i]).powi(2)).sum();
         let above = if self.axes() == 2 {
@@ -88,15 +93,17 @@ impl<const S: usize> Problem<'_, S> {
     #[inline]
     fn expected(&self, x: &Vector<S>, one: &Collected) -> (f64, Vector<S>) {
         let axes = Self::AXES;
+        let measured = self.search.known.measured;
         let d = self.search.distance(x, one);
         let factor = 1.0 + x[axes + 1];
         let mut gradient = [0.0; S];
         if d > 0.0 {
-            let slope = factor / d;
+            let slope = factor * measured.slope(d) / d;
             (0..axes).for_each(|i| gradient[i] = slope * (x[i] - one.place[i]));
         }
-        (gradient[axes], gradient[axes + 1]) = (1.0, d);
-        (factor * d + x[axes], gradient)
+        let value = measured.of(d);
+        (gradient[axes], gradient[axes + 1]) = (1.0, value);
+        (factor * value + x[axes], gradient)
     }
 
     fn at(&self, x: &Vector<S>) -> Local<S> {

@@ -6,6 +6,7 @@
 //! moments   of the distance by cubature over the position, so that a wide belief near an anchor is not linearised at one point
 //! ```
 
+use super::measured::Measured;
 use super::root::root;
 use super::step::Step;
 
@@ -162,12 +163,13 @@ impl Normal {
     }
 
     /// Moments of the noise-free range to an anchor. `place`: its coordinates. `above`: what it is higher than the target if heights are known.
-    pub(super) fn range(&self, place: &[f64; 3], above: f64, anchor: usize, out: &mut Predicted) {
-        of_size!(self.range_of(place, above, anchor, out));
+    pub(super) fn range(&self, measured: Measured, place: &[f64; 3], above: f64, anchor: usize, out: &mut Predicted) {
+        of_size!(self.range_of(measured, place, above, anchor, out));
     }
 
     fn range_of<const N: usize, const AXES: usize>(
         &self,
+        measured: Measured,
         place: &[f64; 3],
         above: f64,
         anchor: usize,
@@ -185,11 +187,12 @@ impl Normal {
             let off = [point[0] - place[0], point[1] - place[1], point[2] - place[2]];
             (off[0] * off[0] + off[1] * off[1] + off[2] * off[2]).sqrt()
         };
-        let centre = distance(&at);
+        let far = distance(&at);
+        let centre = measured.of(far);
         let spread: f64 = (0..axes).map(|i| covariance[i * n + i]).sum();
         // Gradient of the distance by the position, its mean, and the variance that the gradient does not explain.
         let (mut gradient, mut mean, mut rest) = ([0.0; AXES], centre, 0.0);
-        let root = if spread > 1e-5 * centre * centre {
+        let root = if spread > 1e-5 * far * far {
             root::<AXES>(axes, 1e-14 * spread, |i, j| covariance[i * n + j])
         } else {
             None
@@ -201,7 +204,7 @@ impl Normal {
                 let ends = [1.0, -1.0].map(|sign| {
                     let mut point = at;
                     (0..axes).for_each(|i| point[i] += sign * reach * root[i][column]);
-                    distance(&point) - centre
+                    measured.of(distance(&point)) - centre
                 });
                 sum += ends[0] + ends[1];
                 squares += ends[0] * ends[0] + ends[1] * ends[1];
@@ -217,8 +220,9 @@ impl Normal {
                 let later: f64 = (i + 1..axes).map(|j| root[j][i] * gradient[j]).sum();
                 gradient[i] = (slopes[i] - later) / root[i][i];
             }
-        } else if centre > 0.0 {
-            (0..axes).for_each(|i| gradient[i] = (at[i] - place[i]) / centre);
+        } else if far > 0.0 {
+            let slope = measured.slope(far);
+            (0..axes).for_each(|i| gradient[i] = slope * ((at[i] - place[i]) / far));
         }
         let factor = 1.0 + means[scale];
         out.mean = factor * mean + means[bias];
@@ -364,7 +368,7 @@ mod tests {
         let mut predicted = Predicted::default();
         for k in 0..60_i32 {
             let place = [10.0 * f64::from(k % 3), 7.0 * f64::from(k % 2), 0.0];
-            normal.range(&place, 0.0, 0, &mut predicted);
+            normal.range(Measured::Distance, &place, 0.0, 0, &mut predicted);
             let factor = if k % 4 == 3 { 3.0 } else { 0.3 };
             normal.condition(&predicted, predicted.mean, factor * predicted.variance, true);
             let scale = normal.scale();

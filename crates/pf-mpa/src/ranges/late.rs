@@ -8,7 +8,7 @@ use super::settings::Known;
 
 /// A range is suspect from so many deviations above the expected one.
 const SUSPECT: f64 = 1.0;
-/// Probability that an anchor becomes late in a range, and the mean of its lateness in spreads of the anchors.
+/// Probability that an anchor becomes late in a range, and the mean of its lateness in spreads of the anchors, or in a logarithm.
 const BEGINS: f64 = 0.01;
 const LATENESS: f64 = 0.15;
 /// Hypotheses of less than this share do not branch, nor if there are this many.
@@ -27,7 +27,7 @@ pub(super) fn with_late(
     has_enough: impl Fn(&Hypothesis) -> bool,
 ) -> Vec<Hypothesis> {
     let mut found = Vec::new();
-    let mean = LATENESS * known.anchors_spread;
+    let mean = LATENESS * known.size;
     for ((one, (expected, variance)), share) in hypotheses.iter().zip(expectations).zip(shares) {
         let off = range - expected;
         let is_suspect = off > 0.0 && off * off > SUSPECT * SUSPECT * variance;

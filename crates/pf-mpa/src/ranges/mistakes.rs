@@ -32,7 +32,7 @@ pub enum Mistake {
 struct Trial {
     /// `ln` of their probability density; `None` if the track is lost.
     log_evidence: Option<f64>,
-    /// Whether few rows are doubtful, no anchor contradicts the others, and none has a bias of its own.
+    /// Whether few rows are doubtful, no anchor contradicts the others, none has a bias of its own, and no residuals last.
     fits: bool,
 }
 
@@ -56,6 +56,7 @@ fn trial(
     let mut fits = SELDOM * doubtful <= ranges.len();
     for (name, _) in anchors {
         fits &= tracker.works(name)? > 0.5 && tracker.own_bias(name)?.is_none();
+        fits &= tracker.lasting_residuals(name)?.is_none();
     }
     Ok(Trial {
         log_evidence: tracker.log_evidence(),
@@ -102,7 +103,7 @@ pub fn mistake_of(
         }
     }
     let is_positive = ranges.iter().all(|(_, _, range)| *range > 0.0);
-    if is_positive && !settings.unknown_clock {
+    if is_positive && !settings.unknown_clock && !settings.proportional {
         let mut change = |mistake: Mistake, map: &dyn Fn(f64) -> f64, slope: &dyn Fn(f64) -> f64| {
             let changed: Vec<(f64, &str, f64)> = ranges
                 .iter()

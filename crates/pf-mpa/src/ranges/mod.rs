@@ -22,13 +22,16 @@ mod bank;
 mod estimate;
 mod fit;
 mod gaussian;
+mod growth;
 mod heights;
 mod late;
 mod line;
+mod measured;
 mod mirror;
 mod mistakes;
 mod moved;
 mod odds;
+mod residuals;
 mod rest;
 mod root;
 mod rows;
@@ -37,6 +40,7 @@ mod settings;
 mod step;
 
 pub use estimate::RangeEstimate;
+pub use growth::proportion_of;
 pub use heights::height_of;
 pub use mistakes::{Mistake, mistake_of};
 pub use settings::{Height, RangeSettings};
@@ -49,12 +53,14 @@ use arrived::Arrived;
 use bank::Hypothesis;
 use fewbits_core::Gaussian;
 use fewbits_core::RangeNoise;
-use fewbits_numerics::error::{finite, refuse, within};
+use fewbits_numerics::error::{finite, positive, refuse, within};
 use fit::Calibration;
 use late::with_late;
+use measured::Measured;
 use mirror::add_mirrored;
 use nalgebra::Vector3;
 use odds::{count_contradictions, drop_improbable, is_lost, merge_same, shares_of, uncertainty_of_noise, weigh};
+use residuals::Residuals;
 use rows::{Collected, Latest};
 use settings::{Known, NEGLIGIBLE_OF_LEVELS};
 use std::collections::BTreeMap;
@@ -101,6 +107,7 @@ pub struct RangeTracker {
     losses: usize,
     /// `ln` of the evidence that was taken off the hypotheses' weights.
     evidence: f64,
+    residuals: Vec<Residuals>,
 }
 
 impl RangeTracker {
@@ -149,6 +156,7 @@ impl RangeTracker {
             collected: BTreeMap::new(),
             tried: 0,
             calibration: [(0.0, known.bias * known.bias), (0.0, known.scale * known.scale)],
+            residuals: vec![Residuals::default(); places.len()],
             known,
             last: f64::NEG_INFINITY,
             at: f64::NEG_INFINITY,
@@ -169,12 +177,17 @@ impl RangeTracker {
     /// Processes one range at `time` (seconds, not before the last). `None` during acquisition.
     ///
     /// # Errors
-    /// If there is no such anchor, a number is not finite, or `time` is before the last range's.
+    /// If there is no such anchor, a number is not finite, `time` is before the last range's, or a range whose error is in proportion to the
+    /// distance is not positive.
     pub fn push(&mut self, time: f64, anchor: &str, range: f64) -> Result<Option<RangeEstimate>, Error> {
         finite("range", range)?;
         finite("range in 32 bits", f64::from(range as f32))?;
         self.check_time(time)?;
         let anchor = self.number(anchor)?;
+        let range = match self.known.measured {
+            Measured::Distance => range,
+            Measured::Logarithm { unit } => (positive("range", range)? / unit).ln(),
+        };
         let (is_new, elapsed) = (time > self.last, time - self.last);
         if elapsed > self.known.silence {
             self.pause();
@@ -191,8 +204,11 @@ impl RangeTracker {
         let mut next = std::mem::take(&mut self.next);
         next.clone_from(&self.hypotheses);
         let lost = match self.track(&mut next, time - self.at, is_new, anchor, range) {
-            Ok(taken) => {
+            Ok((taken, residual)) => {
                 self.evidence += taken;
+                if self.travel == Travel::Full && (self.known.clock.is_none() || !is_new) {
+                    self.residuals[anchor].observe(residual);
+                }
                 is_lost(&next, self.travel != Travel::Full)
             }
             // The range has probability zero under every hypothesis, even as an outlier.
@@ -234,7 +250,7 @@ impl RangeTracker {
             self.collected.clear();
             if !self.hypotheses.is_empty() {
                 let mut next = self.hypotheses.clone();
-                if let Ok(taken) = self.track(&mut next, time - self.at, true, anchor, range) {
+                if let Ok((taken, _)) = self.track(&mut next, time - self.at, true, anchor, range) {
                     self.hypotheses = next;
                     self.at = time;
                     self.evidence += taken;
@@ -258,8 +274,9 @@ impl RangeTracker {
         let rows: Vec<Collected> = self
             .collected
             .iter()
-            .map(|(anchor, latest)| latest.seen_at(time, *anchor, &self.places[*anchor]))
+            .map(|(anchor, latest)| latest.seen_at(time, *anchor, &self.places[*anchor], self.known.measured))
             .collect();
+        self.residuals.iter_mut().for_each(Residuals::interrupt);
         self.hypotheses = hypotheses(&self.known, self.places.len(), self.calibration, &rows);
         self.tried = 0;
         let mut found = std::mem::take(&mut self.hypotheses);
@@ -268,7 +285,8 @@ impl RangeTracker {
         self.at = time;
     }
 
-    /// Moves hypotheses on and updates them with a range. Returns `ln` of the evidence that was taken off their weights.
+    /// Moves hypotheses on and updates them with a range. Returns `ln` of the evidence that was taken off their weights, and the range's residual in
+    /// its predicted deviation.
     fn track(
         &self,
         next: &mut Vec<Hypothesis>,
@@ -276,7 +294,7 @@ impl RangeTracker {
         is_new: bool,
         anchor: usize,
         range: f64,
-    ) -> Result<f64, Error> {
+    ) -> Result<(f64, f64), Error> {
         let (known, place) = (&self.known, &self.places[anchor]);
         let step = Step::over(elapsed, known.persistence, known.drift);
         let shares = shares_of(next);
@@ -292,6 +310,7 @@ impl RangeTracker {
             square += share * (variance + expected * expected);
             expectations.push((expected, variance));
         }
+        let residual = (range - mean) / (square - mean * mean).max(f64::MIN_POSITIVE).sqrt();
         let arrived = match self.travel {
             Travel::Full if known.clock.is_some() && is_new => Arrived::First(f64::from(range as f32)),
             Travel::Full => Arrived::Value(f64::from(range as f32)),
@@ -329,7 +348,7 @@ impl RangeTracker {
         let mut evidences: Vec<(bool, f64)> = Vec::with_capacity(next.len());
         next.retain_mut(|one| {
             let short = is_short(one);
-            let holds_scale = one.rests(known) || (!one.is_cut && short);
+            let holds_scale = one.rests(known, short) || (!one.is_cut && short);
             match one.update(known, anchor, &arrived, holds_scale) {
                 Ok(log_evidence) if one.is_finite() => {
                     evidences.push((is_undecided || short && one.apart.is_some(), log_evidence));
@@ -359,7 +378,7 @@ impl RangeTracker {
             merge_same(next);
             add_mirrored(known, next);
         }
-        Ok(taken)
+        Ok((taken, residual))
     }
 
     fn estimate(&self, lost: bool) -> Option<RangeEstimate> {

@@ -49,15 +49,18 @@ impl RangeTracker {
 
 impl Hypothesis {
     /// Whether the error of scale is not to be estimated: from one place, ranges to anchors with biases of their own, or from an unknown clock, do
-    /// not tell it from these, and a filter that linearises them again and again would believe that they do.
-    pub(super) fn rests(&mut self, known: &Known) -> bool {
+    /// not tell it from these, and a filter that linearises them again and again would believe that they do. `is_short`: the anchors without biases
+    /// of their own are fewer than position, bias and error of scale have coordinates.
+    pub(super) fn rests(&mut self, known: &Known, is_short: bool) -> bool {
         let heaviest = (0..self.filters.len()).max_by(|i, j| self.weights[*i].total_cmp(&self.weights[*j]));
         let Some(heaviest) = heaviest else {
             return false;
         };
         let state = &self.filters[heaviest];
         let is_slowest = heaviest < known.noises.len();
-        let is_blind = known.clock.is_some() || state.mean.len() > 2 * state.axes + 2;
+        let has_own = state.mean.len() > 2 * state.axes + 2;
+        // One anchor's own bias is told from the rest at one place if the others are enough.
+        let is_blind = known.clock.is_some() || has_own && (state.only.is_none() || is_short);
         self.rest.observe(state) && is_slowest && is_blind && known.scale > 0.0
     }
 }

@@ -1,5 +1,7 @@
 //! Ranges that a place must explain.
 
+use super::measured::Measured;
+
 /// The latest range of an anchor.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Collected {
@@ -8,6 +10,8 @@ pub(super) struct Collected {
     pub(super) range: f64,
     /// Seconds since it was taken.
     pub(super) age: f64,
+    /// What the range changes by for a change of the distance of one.
+    pub(super) slope: f64,
 }
 
 /// The latest range in full of an anchor.
@@ -29,7 +33,7 @@ impl Latest {
     }
 
     /// The range as one that a place at `time` must explain. The target was where it is less what it moved: so the anchor is moved instead.
-    pub(super) fn seen_at(&self, time: f64, anchor: usize, place: &[f64; 3]) -> Collected {
+    pub(super) fn seen_at(&self, time: f64, anchor: usize, place: &[f64; 3], measured: Measured) -> Collected {
         let mut place = *place;
         place.iter_mut().zip(&self.moved).for_each(|(x, by)| *x += by);
         Collected {
@@ -37,6 +41,7 @@ impl Latest {
             place,
             range: self.range,
             age: time - self.time,
+            slope: measured.slope_at(self.range),
         }
     }
 }
@@ -61,7 +66,10 @@ impl<'a> Rows<'a> {
     pub(super) fn new(ranges: &'a [Collected], noise: f64, speed: f64, slice: Option<Slice>) -> Self {
         Self {
             ranges,
-            deviations: ranges.iter().map(|one| noise.hypot(speed * one.age)).collect(),
+            deviations: ranges
+                .iter()
+                .map(|one| noise.hypot(speed * one.age * one.slope))
+                .collect(),
             slice,
         }
     }

@@ -54,7 +54,7 @@ impl Search<'_> {
         // A product of few ratios does not overflow, and one logarithm is cheaper than many.
         let mut ratio = 1.0;
         for (number, one) in ranges.iter().enumerate() {
-            let d = self.distance(point, one);
+            let d = self.measured(point, one);
             let cross = [p[0] + d * p[1], p[1] + d * p[2]];
             let spread = cross[0] + d * cross[1] + variance;
             let off = one.range - (1.0 + mean[1]) * d - mean[0];
@@ -83,7 +83,7 @@ impl Search<'_> {
         let width = (2 * nodes + 1) as usize;
         let count = width.pow(axes as u32);
         // Half a step: between two nodes the likelihood must not vanish.
-        let smooth = 0.5 * step * self.known.spreads[0];
+        let smooth = 0.5 * step * self.known.spreads[0] * self.known.size / self.known.anchors_spread;
         let largest = self.known.noises.iter().fold(0.0_f64, |most, noise| most.max(*noise));
         let variance = smooth * smooth + (0.25 * largest).powi(2).min(smooth * smooth);
         let place = |index: usize| {
@@ -174,7 +174,8 @@ impl Search<'_> {
             .map(|range| self.distance(&one.normal.mean, range))
             .fold(f64::INFINITY, f64::min);
         // At the end of a slice the distance may differ from the linearised one by half of the noise.
-        let noise = one.noise.max(self.known.noises[0]);
+        let noise =
+            one.noise.max(self.known.noises[0]) / self.known.measured.slope(nearest.max(0.05 * self.known.spreads[0]));
         let wanted = (noise * nearest.max(0.05 * self.known.spreads[0])).sqrt();
         if length < wanted {
             return Vec::new();
@@ -239,7 +240,9 @@ impl Search<'_> {
                 }
                 let variances: Vec<f64> = ranges
                     .iter()
-                    .map(|range| noise * noise + (speed * range.age).powi(2) + own.of(range.anchor).powi(2))
+                    .map(|range| {
+                        noise * noise + (speed * range.age * range.slope).powi(2) + own.of(range.anchor).powi(2)
+                    })
                     .collect();
                 let is_alike = |known: &[f64]| {
                     let mut pairs = variances.iter().zip(known);

@@ -1,6 +1,7 @@
 //! Settings of the range tracker.
 
 use super::line::Line;
+use super::measured::Measured;
 use crate::Error;
 use fewbits_numerics::error::{finite, non_negative, positive, refuse, within};
 use nalgebra::Vector3;
@@ -16,12 +17,20 @@ mod shares {
     pub(super) const BIAS: f64 = 0.2;
     pub(super) const ANCHOR_BIAS: f64 = 0.03;
     /// Probability that an anchor has a bias of its own of the size of the common one.
-    pub(super) const OUT_OF_PLACE: f64 = 0.03;
+    pub(super) const OUT_OF_PLACE: f64 = 0.08;
     pub(super) const STRAY: f64 = 4.0;
     /// Deviation of an estimated height, at least.
     pub(super) const HEIGHT: f64 = 0.5;
     /// Deviation of a clock that nothing is known of.
     pub(super) const CLOCK: f64 = 10.0;
+}
+/// The same for ranges whose errors are in proportion to the distance: of their logarithms.
+mod logarithms {
+    pub(super) const NOISE: f64 = 1.0;
+    pub(super) const NOISES: f64 = 32.0;
+    pub(super) const BIAS: f64 = 0.3;
+    pub(super) const ANCHOR_BIAS: f64 = 0.1;
+    pub(super) const OF_ONE: f64 = 0.4;
 }
 /// Uncertainty of a noise or speed that is stated, as a factor.
 const STATED: f64 = 4.0;
@@ -85,6 +94,10 @@ pub struct RangeSettings {
     /// Whether the ranges of one time share an unknown offset that has nothing to do with that of other times: differences of times of
     /// arrival with an unknown clock. Ranges must then travel in full.
     pub unknown_clock: bool,
+    /// Whether errors are in proportion to the distance, as those of distances from signal strengths, whose shadowing is a number of decibels:
+    /// `ln range = (1 + scale) ln distance + bias + noise`, distances in spreads of the anchors. Deviations of noise, biases and scale are those of
+    /// the logarithm: about shares of the distance, and of the exponent. Defaults: noise up to 1, bias 0.3, single anchors' biases 0 or 0.1.
+    pub proportional: bool,
 }
 
 impl Default for RangeSettings {
@@ -104,6 +117,7 @@ impl Default for RangeSettings {
             silence: 30.0,
             height: Height::Unsaid,
             unknown_clock: false,
+            proportional: false,
         }
     }
 }
@@ -161,6 +175,9 @@ pub(super) struct Known {
     pub(super) line: Option<Line>,
     /// The spread of the anchors.
     pub(super) anchors_spread: f64,
+    /// What a range measures, and its change over the room: the spread, or 1 of a logarithm.
+    pub(super) measured: Measured,
+    pub(super) size: f64,
     /// Deviations of the bank, and the steps between them as lists.
     pub(super) noises: Vec<f64>,
     pub(super) speeds: Vec<f64>,
@@ -199,28 +216,46 @@ impl RangeSettings {
             let size = anchors.iter().map(|place| (place - middle).amax()).fold(0.0, f64::max);
             return refuse("anchors", format!("{size} from their middle"), "a unit in which this is 1e-70 to 1e70");
         }
-        let or = |stated: Option<f64>, share: f64| stated.unwrap_or(share * spread);
+        let (measured, size) = if self.proportional {
+            if self.unknown_clock {
+                return refuse("proportional", "with an unknown clock", "one of the two: an offset has no logarithm");
+            }
+            (Measured::Logarithm { unit: spread }, 1.0)
+        } else {
+            (Measured::Distance, spread)
+        };
+        // The default of a length that is measured, of distances and of logarithms.
+        let of_ranges = |stated: Option<f64>, share: f64, logarithm: f64| {
+            let own = if self.proportional { logarithm } else { share * spread };
+            stated.unwrap_or(own)
+        };
         let factor = |factor: Option<f64>, stated: Option<f64>, unstated: f64| {
             factor.unwrap_or(if stated.is_some() { STATED } else { unstated })
         };
-        let noise = or(self.noise, shares::NOISE);
-        let speed = or(self.speed, shares::SPEED);
-        let noise_factor = factor(self.noise_factor, self.noise, shares::NOISES);
+        let noise = of_ranges(self.noise, shares::NOISE, logarithms::NOISE);
+        let speed = self.speed.unwrap_or(shares::SPEED * spread);
+        let noises = if self.proportional {
+            logarithms::NOISES
+        } else {
+            shares::NOISES
+        };
+        let noise_factor = factor(self.noise_factor, self.noise, noises);
         let speed_factor = factor(self.speed_factor, self.speed, shares::SPEEDS);
-        let (bias, stray) = (or(self.bias, shares::BIAS), or(self.stray, shares::STRAY));
+        let bias = of_ranges(self.bias, shares::BIAS, logarithms::BIAS);
+        let stray = of_ranges(self.stray, shares::STRAY, shares::STRAY);
         within("outliers", self.outliers, 0.0, 0.5)?;
         within("noise_factor", noise_factor, 1.0, 1e3)?;
         within("speed_factor", speed_factor, 1.0, 1e3)?;
-        for (name, value) in [
-            ("noise", noise),
-            ("stray", stray),
-            ("speed", speed),
-            ("persistence", self.persistence),
-            ("silence", self.silence),
+        for (name, value, size) in [
+            ("noise", noise, size),
+            ("stray", stray, size),
+            ("speed", speed, spread),
+            ("persistence", self.persistence, spread),
+            ("silence", self.silence, spread),
         ] {
             positive(name, value)?;
             // Squares are computed.
-            if !(value / spread * (value / spread)).is_normal() {
+            if !(value / size * (value / size)).is_normal() {
                 return refuse(
                     name,
                     value,
@@ -235,10 +270,11 @@ impl RangeSettings {
         let anchor_biases = match self.anchor_bias {
             Some(deviation) => vec![(Own::Each(non_negative("anchor_bias", deviation)?), 1.0)],
             None if bias > 0.0 => {
-                let mut all = vec![(Own::Each(0.0), 0.7), (Own::Each(shares::ANCHOR_BIAS * spread), 0.3)];
+                let each = of_ranges(None, shares::ANCHOR_BIAS, logarithms::ANCHOR_BIAS);
+                let mut all = vec![(Own::Each(0.0), 0.7), (Own::Each(each), 0.3)];
                 // One anchor stands elsewhere, or is behind a wall for good.
                 if anchors.len() > 3 && !self.unknown_clock {
-                    let deviation = shares::BIAS * spread;
+                    let deviation = of_ranges(None, shares::BIAS, logarithms::OF_ONE);
                     all.extend(
                         (0..anchors.len()).map(|anchor| (Own::Only { anchor, deviation }, shares::OUT_OF_PLACE)),
                     );
@@ -271,6 +307,8 @@ impl RangeSettings {
             spreads: [spread, spread, deviation],
             line: Line::of(anchors),
             anchors_spread: spread,
+            measured,
+            size,
             log_noises: noises.iter().map(|one| one.ln()).collect(),
             log_speeds: speeds.iter().map(|one| one.ln()).collect(),
             noises,

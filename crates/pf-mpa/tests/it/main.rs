@@ -10,4 +10,5 @@ mod laws;
 mod odometry;
 mod recording;
 mod rooms;
+mod strengths;
 mod wild;

@@ -283,6 +283,49 @@ fn little_evidence_decides_nothing_among_four_anchors() {
     }
 }
 
+/// Defect: while a target rests, an explanation by one long anchor of five did not estimate the error of scale though the other four tell it. It lost
+/// evidence by that, and a narrow wrong place was left for 74 ranges.
+#[test]
+fn a_resting_target_tells_the_long_anchor_of_five() {
+    for seed in [60365, 910_212] {
+        let mut room = Room::random(seed);
+        room.long = Some(long_anchor(&room, seed));
+        let outcome = walk(&room, seed, Travel::Full, RangeSettings::default());
+        println!("{outcome:?}");
+        assert!(outcome.longest_wrong < LONG && 2 * outcome.held > outcome.rows, "{outcome:?}");
+    }
+}
+
+/// Defect: exchanged names among four anchors with known bias and scale left a wrong place under a narrow band, and no sign of it.
+#[test]
+fn residuals_last_where_anchors_are_exchanged() {
+    let settings = RangeSettings {
+        bias: Some(0.0),
+        scale: 0.0,
+        ..RangeSettings::default()
+    };
+    let anchors = &hall()[..4];
+    let told = |is_exchanged: bool| {
+        let mut rng = Stream::new(12).named("exchanged").rng();
+        let mut said = anchors.to_vec();
+        if is_exchanged {
+            (said[0].1, said[1].1) = (said[1].1, said[0].1);
+        }
+        let mut tracker = RangeTracker::new(said, Travel::Full, settings).unwrap();
+        for k in 0..400 {
+            let time = 0.2 * k as f64;
+            let (x, y) = (5.0 + 3.0 * (0.3 * time).sin(), 4.0 + 2.0 * (0.2 * time).cos());
+            let (name, place) = &anchors[k % 4];
+            let range = (Vector3::new(x, y, 0.0) - place).norm() + 0.1 * rng.sample::<f64, _>(StandardNormal);
+            tracker.push(time, name, range).unwrap();
+        }
+        let lasting = |(name, _): &(String, Vector3<f64>)| tracker.lasting_residuals(name).unwrap();
+        anchors.iter().filter_map(lasting).count()
+    };
+    let (right, exchanged) = (told(false), told(true));
+    assert!(right == 0 && exchanged >= 2, "{right}, {exchanged}");
+}
+
 /// Defect: one anchor whose ranges are long for good drew the place away, with a narrow band: 74 % of the truths were held, and in 12 of 60 rooms
 /// the place was wrong for twenty ranges and more.
 #[test]

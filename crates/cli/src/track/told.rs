@@ -1,0 +1,97 @@
+//! What the first ranges of a file tell of `ranges` where no option says it: whether errors grow with the distance, and the height of the target.
+
+use super::anchors::Anchor;
+use super::mistakes::{grows, limit};
+use super::range_settings::Strengths;
+use super::rows::Instants;
+use crate::arguments::RangesOptions;
+use crate::error::Error;
+use crate::files::is_regular;
+use crate::numbers::short;
+use fewbits_pf_mpa::{Height, RangeSettings, height_of, proportion_of};
+
+/// Rows from which it is found.
+const FIRST_ROWS: usize = 600;
+
+/// Time in seconds, anchor and range of the first rows, without limits.
+fn first(
+    options: &RangesOptions,
+    anchors: &[Anchor],
+    instants: &mut Instants,
+) -> Result<Vec<(f64, String, f64)>, Error> {
+    let strengths = Strengths::of(options)?;
+    let first = instants.peek(FIRST_ROWS)?.clone();
+    let names = &instants.names;
+    let mut ranges = Vec::new();
+    for instant in &first {
+        for (i, (sensor, range)) in instant.reports.iter().enumerate() {
+            let name = &names[*sensor];
+            let is_limit = instant.qualifiers.get(i).is_some_and(|one| one.limit.is_some());
+            let is_known = anchors.iter().any(|(known, _)| known == name);
+            let range = range.map(|range| strengths.map_or(range, |strengths| strengths.distance(range)));
+            if let Some(range) = range
+                .filter(|range| range.is_finite() && (*range >= 0.0 || options.unknown_clock) && !is_limit && is_known)
+            {
+                ranges.push((instant.seconds, name.clone(), range));
+            }
+        }
+    }
+    // Limits are no distances: they would tell a height that is not there.
+    if let Some(limit) = limit(ranges.iter().map(|(_, anchor, range)| (anchor.as_str(), *range))) {
+        ranges.retain(|(_, _, range)| *range < limit);
+    }
+    Ok(ranges)
+}
+
+/// Takes into the settings what the first ranges of a file tell, and says it. What comes through a pipe is not waited for.
+pub(super) fn take_told(
+    options: &RangesOptions,
+    anchors: &[Anchor],
+    settings: &mut RangeSettings,
+    instants: &mut Instants,
+) -> Result<Vec<String>, Error> {
+    let mut said = Vec::new();
+    let is_flat = anchors.iter().all(|(_, place)| place.z == 0.0);
+    if is_regular(&options.table.file) {
+        let owned = first(options, anchors, instants)?;
+        let ranges: Vec<(f64, &str, f64)> = owned
+            .iter()
+            .map(|(time, name, range)| (*time, name.as_str(), *range))
+            .collect();
+        // What is wrong with a range is said when its row is read.
+        let height = |settings: RangeSettings| height_of(anchors, settings, &ranges).unwrap_or(None);
+        let proportion = |settings: RangeSettings| proportion_of(anchors, settings, &ranges).unwrap_or(None);
+        let at = |settings: RangeSettings, height: Option<f64>| RangeSettings {
+            height: height.map_or(settings.height, Height::Known),
+            ..settings
+        };
+        let mut found = height(*settings);
+        // A height that is not known makes errors that depend on the distance too.
+        if let Some((noise, proportional)) = proportion(at(*settings, found)) {
+            said.push(grows(noise, "taken, as"));
+            *settings = RangeSettings {
+                height: settings.height,
+                ..proportional
+            };
+            found = height(*settings);
+        }
+        if let Some(height) = found {
+            settings.height = Height::Known(height);
+            let height = short(height);
+            said.push(if is_flat {
+                format!(
+                    "the ranges say that the target is {height} higher or lower than the anchors: taken, as --height {height} says; --height 0 leaves it out"
+                )
+            } else {
+                format!("the ranges say that the target is at the height {height}: taken, as --height {height} says")
+            });
+        }
+    }
+    if !is_flat && settings.height == Height::Unsaid {
+        return Err(Error::Needed {
+            option: "--height",
+            reason: "the anchors have heights, and the first ranges do not tell that of the target",
+        });
+    }
+    Ok(said)
+}
