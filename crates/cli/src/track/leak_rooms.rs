@@ -12,8 +12,10 @@ use std::path::Path;
 /// Ages of a response: so many between the longest and this share of it, each larger than the one before by the same factor.
 const AGES: usize = 20;
 const SHORTEST: f64 = 0.005;
-/// Largest number of cells times sensors: the belief of these takes about 3 GiB if all send values.
-const MOST_CELLS: usize = 50_000;
+/// Largest number of cells times sensors: the belief of these takes 1 to 3 GiB.
+const MOST_CELLS: usize = 200_000;
+/// A sensor of values counts as so many of words: what its values share is kept for each hypothesis.
+const OF_VALUES: usize = 4;
 
 /// Content of `rooms.toml`.
 #[derive(Deserialize)]
@@ -134,9 +136,12 @@ impl Rooms {
             return Err(Error::content("--rooms", problem));
         }
         let domain = plan.domain(self.square, self.split, 0.0).map_err(&refused)?;
-        if domain.free().len().saturating_mul(self.sensor.len()) > MOST_CELLS {
+        let count = |sensor: &Sensor| if sensor.thresholds.is_empty() { OF_VALUES } else { 1 };
+        let sensors: usize = self.sensor.iter().map(count).sum();
+        if domain.free().len().saturating_mul(sensors) > MOST_CELLS {
             let problem = format!(
-                "{} cells and {} sensors: their product may be {MOST_CELLS} at most, take larger squares or split = 1",
+                "{} cells and {} sensors: the product may be {MOST_CELLS} at most, where a sensor of values counts as {OF_VALUES}; \
+                 take larger squares or split = 1",
                 domain.free().len(),
                 self.sensor.len()
             );
