@@ -93,15 +93,16 @@ mod tests {
     fn days_pass_at_midnight_and_late_rows_stay_in_theirs() {
         let day = 86_400;
         assert_eq!(
-            found(true, true, [86_000, 86_399, 1, 86_398, 5, 50_000, 40_000, 86_399, 0]),
+            found(true, true, [86_000, 86_399, 1, 86_398, 5, 40_000, 30_000, 70_000, 86_399, 0]),
             [
                 86_000,
                 86_399,
                 day + 1,
                 86_398,
                 day + 5,
-                day + 50_000,
                 day + 40_000,
+                day + 30_000,
+                day + 70_000,
                 day + 86_399,
                 2 * day
             ]

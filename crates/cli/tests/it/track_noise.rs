@@ -87,3 +87,30 @@ fn another_unit_is_told() {
         "{summary}"
     );
 }
+
+/// Defect: errors that last from row to row were counted as independent ones: bands of 95 % held .4 of the rows.
+#[test]
+fn noise_that_lasts_widens_the_band() {
+    let (mut inside, mut rows) = (0, 0);
+    for seed in 0..6 {
+        let mut numbers = Numbers(7500 + seed);
+        let (mut level, mut off, mut truth, mut table) = (20.0, [0.0; 3], Vec::new(), "a,b,c\n".to_owned());
+        for _ in 0..600 {
+            level += 0.05 * numbers.normal();
+            truth.push(level);
+            off = off.map(|off| 0.9 * off + 0.19_f64.sqrt() * numbers.normal());
+            let cells = off.map(|off| format!("{:.4}", level + off));
+            table += &(cells.join(",") + "\n");
+        }
+        let (found, summary) = tracked(&table, &[]);
+        assert!(has_hint(&summary, "last for several rows"), "{summary}");
+        inside += found
+            .iter()
+            .zip(&truth)
+            .filter(|(row, truth)| held(row, **truth))
+            .count();
+        rows += found.len();
+    }
+    let share = inside as f64 / rows as f64;
+    assert!(share > 0.65, "{share}");
+}
