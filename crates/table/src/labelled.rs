@@ -8,7 +8,7 @@ use crate::head::Head;
 /// The key of a time that stands in front without a name.
 const TIME: &str = "time";
 
-/// Whether the first lines are such lines: as many names as in the first line, or nearly all of them, in each of at least two.
+/// Whether the first lines are such lines: nearly all of them, the first two with a name in common, or the only one with two names.
 pub(crate) fn is_labelled(head: &Head) -> bool {
     let lines: Vec<&str> = head
         .lines
@@ -17,7 +17,10 @@ pub(crate) fn is_labelled(head: &Head) -> bool {
         .filter(|line| !line.is_empty())
         .collect();
     let found: Vec<_> = lines.iter().map(|line| found(line)).collect();
-    let (Some(Some(first)), Some(Some(second))) = (found.first(), found.get(1)) else {
+    let (Some(Some(first)), Some(second)) = (found.first(), found.get(1).or(found.first())) else {
+        return false;
+    };
+    let Some(second) = second.as_ref().filter(|second| lines.len() > 1 || second.len() > 1) else {
         return false;
     };
     let have_same_name = first
@@ -51,20 +54,21 @@ fn found(line: &str) -> Option<Vec<(String, String)>> {
         pairs.push((TIME.to_owned(), time.to_owned()));
         (rest, before) = (&line[begin..], 1);
     }
-    let mark = [',', ';', '\t'].into_iter().find(|mark| rest.contains(*mark));
-    let pieces: Vec<&str> = match mark {
-        Some(mark) => rest.split(mark).collect(),
-        None => rest.split_whitespace().collect(),
-    };
-    for piece in pieces {
-        let at = piece.find([':', '='])?;
-        let (name, value) = (piece[..at].trim(), piece[at + 1..].trim());
-        if !is_name(name) || value.is_empty() && mark.is_none() {
-            return None;
-        }
-        pairs.push((name.to_owned(), value.trim_matches('"').to_owned()));
-    }
+    // A comma may stand before decimals, where another mark separates cells.
+    let marks = ['\t', ';', ','].into_iter().filter(|mark| rest.contains(*mark));
+    let cells = marks
+        .map(|mark| rest.split(mark).map(cell).collect::<Option<Vec<_>>>())
+        .find(Option::is_some);
+    let cells = cells.unwrap_or_else(|| rest.split_whitespace().map(cell).collect())?;
+    pairs.extend(cells);
     (pairs.len() > before).then_some(pairs)
+}
+
+/// The name and the text of a cell.
+fn cell(piece: &str) -> Option<(String, String)> {
+    let (name, value) = piece.split_at(piece.find([':', '='])?);
+    let (name, value) = (name.trim(), value[1..].trim().trim_matches('"'));
+    is_name(name).then(|| (name.to_owned(), value.to_owned()))
 }
 
 /// Whether a text begins with a name and its mark.
@@ -93,7 +97,7 @@ mod tests {
 
     #[test]
     fn names_stand_in_front() {
-        let cases: [(&str, &[&str]); 8] = [
+        let cases: [(&str, &[&str]); 11] = [
             ("Temp:20.1,Hum:50", &["Temp|20.1", "Hum|50"]),
             ("Temp: 20.1\tHum: 50", &["Temp|20.1", "Hum|50"]),
             ("time=2024-03-01T12:00:00Z temp=-3 x=\"a\"", &["time|2024-03-01T12:00:00Z", "temp|-3", "x|a"]),
@@ -101,6 +105,9 @@ mod tests {
             ("[2024-03-01 12:00:00] T = 3.5; RH (%) = 40;", &["time|2024-03-01 12:00:00", "T|3.5", "RH (%)|40"]),
             ("1700000000,t=20.5 C,state=on", &["time|1700000000", "t|20.5 C", "state|on"]),
             ("Temp:,Hum:50", &["Temp|", "Hum|50"]),
+            ("T:2 H:", &["T|2", "H|"]),
+            ("a=1;b=2,5", &["a|1", "b|2,5"]),
+            ("a=2,5 b=3", &["a|2,5", "b|3"]),
             ("Heat index: 20.9", &[]),
         ];
         for (line, expected) in cases {

@@ -330,6 +330,10 @@ fn cells_with_their_names_in_front() {
         let error = refusal(&mut open_said(&text, &Dialect::default()).unwrap());
         assert!(error.contains("line 42"), "{error}");
     }
+    // One line is a row too, and a comma may stand before decimals.
+    assert_eq!(found("A:1,B:2\n").1, [[Some(1.0)], [Some(2.0)]]);
+    assert_eq!(found("A=1 B=2\nA=3 B=\n").1[1], [Some(2.0), None]);
+    assert!(refusal(&mut open_said("a=1;b=2,5\na=2;b=3,5\n", &Dialect::default()).unwrap()).contains("`2,5`"));
     // A table with a line of names is one.
     assert_eq!(found("name,value\na=1,2\na=2,3\n").0.len(), 2);
 }
