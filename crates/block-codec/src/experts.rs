@@ -2,14 +2,13 @@
 //!
 //! Positions are relative to the last index. A prediction has a logistic law whose scale follows its past errors.
 
-use crate::mixer::EXPERTS;
-use fewbits_node::elementary::power;
+use crate::lanes::{Lanes, power};
 
 /// Each expert's probability below and above an edge, both with a small relative error.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Tails {
-    pub(crate) below: [f32; EXPERTS],
-    pub(crate) above: [f32; EXPERTS],
+    pub(crate) below: Lanes,
+    pub(crate) above: Lanes,
 }
 
 /// `log2 e`: logistic laws are written in powers of two.
@@ -19,25 +18,23 @@ const FLAT: f32 = 60.0;
 /// Weight of the newest error in the mean, after many errors.
 const FADING: f32 = 0.02;
 /// Number of the expert [`Frequencies`]; other experts are predictions.
-pub(crate) const PREDICTED: usize = 1;
-pub(crate) const COUNTED: usize = EXPERTS - 1;
-/// Places for predictions; one is unused.
-const TRACKS: usize = EXPERTS;
+const PREDICTED: usize = 1;
+const COUNTED: usize = 3;
 
-/// Predictions with exponentially weighted means of their absolute errors.
+/// Predictions with exponentially weighted means of their absolute errors; one place is unused.
 #[derive(Debug, Clone)]
 pub(crate) struct Tracks {
-    pub(crate) at: [f32; TRACKS],
-    pub(crate) errors: [f32; TRACKS],
-    sharpness: [f32; TRACKS],
+    pub(crate) at: Lanes,
+    pub(crate) errors: Lanes,
+    sharpness: Lanes,
 }
 
 impl Tracks {
     pub(crate) fn new() -> Self {
         let mut tracks = Self {
-            at: [0.0; TRACKS],
-            errors: [1.0; TRACKS],
-            sharpness: [0.0; TRACKS],
+            at: Lanes::ZERO,
+            errors: Lanes::ONE,
+            sharpness: Lanes::ZERO,
         };
         tracks.sharpen();
         tracks
@@ -46,32 +43,27 @@ impl Tracks {
     /// Computes the scales of the logistic laws from the mean absolute errors.
     #[inline(always)]
     fn sharpen(&mut self) {
-        for i in 0..TRACKS {
-            self.sharpness[i] = LOG2_E / (0.72 * self.errors[i] + 0.06);
-        }
+        self.sharpness = Lanes::splat(LOG2_E) / (self.errors * 0.72 + 0.06);
     }
 
     /// Updates the errors with the actual step; `seen` is the number of earlier steps.
     #[inline(always)]
     pub(crate) fn update(&mut self, step: f32, seen: f32) {
         let rate = (1.0 / (seen + 1.5)).max(FADING);
-        for i in 0..TRACKS {
-            self.errors[i] += ((step - self.at[i]).abs() - self.errors[i]) * rate;
-        }
+        self.errors += ((Lanes::splat(step) - self.at).abs() - self.errors) * rate;
         self.sharpen();
     }
 
     /// The probabilities below and above an edge.
     #[inline(always)]
     pub(crate) fn tails(&self, edge: f32) -> Tails {
-        let mut tails = Tails::default();
-        for i in 0..TRACKS {
-            let odds = (self.at[i] - edge) * self.sharpness[i];
-            let e = power(odds.clamp(-FLAT, FLAT));
-            tails.below[i] = 1.0 / (1.0 + e);
-            tails.above[i] = e * tails.below[i];
+        let odds = (self.at - edge) * self.sharpness;
+        let e = power(odds.fast_clamp(Lanes::splat(-FLAT), Lanes::splat(FLAT)));
+        let below = Lanes::ONE / (e + 1.0);
+        Tails {
+            below,
+            above: e * below,
         }
-        tails
     }
 }
 
@@ -140,20 +132,20 @@ impl<const N: usize> LeastSquares<N> {
         let error = step - product(&self.coefficients, &self.regressors);
         // Recursive least squares with forgetting: the gain is `P x / (memory + x' P x)`.
         let inverse = 1.0 / (MEMORY + product(&gain, &self.regressors));
-        let (mut largest, mut least) = (0.0_f64, f64::INFINITY);
+        let mut is_sound = true;
         for i in 0..N {
             self.coefficients[i] += gain[i] * inverse * error;
-            largest = largest.max(self.coefficients[i].abs());
+            is_sound &= self.coefficients[i].abs() < LARGEST_VARIANCE;
         }
         for (i, row) in self.covariance.iter_mut().enumerate() {
             let k = gain[i] * inverse;
             for j in 0..N {
                 row[j] = (row[j] - k * gain[j]) * (1.0 / MEMORY);
             }
-            (largest, least) = (largest.max(row[i]), least.min(row[i]));
+            is_sound &= (row[i] < LARGEST_VARIANCE) & (row[i] > 0.0);
         }
         // In a direction that is never excited the variance grows exponentially: start again before it overflows.
-        if !(largest < LARGEST_VARIANCE && least > 0.0) {
+        if !is_sound {
             self.covariance = Self::ignorant();
             if !self.coefficients.iter().all(|c| c.abs() < LARGEST_VARIANCE) {
                 self.coefficients = [0.0; N];
@@ -172,14 +164,16 @@ const PRIOR: f32 = 12.0;
 /// Total count at which counting stops.
 const MOST_COUNTED: u32 = 1 << 30;
 /// Number of indices per partial sum.
-const BLOCK: usize = 64;
+const BLOCK: usize = 32;
 
 /// How often each index occurred, for signals whose values return.
 #[derive(Debug, Clone)]
 pub(crate) struct Frequencies {
     counts: Vec<[u32; BLOCK]>,
-    /// Sum of the counts below each group of `BLOCK` indices.
+    /// Sum of the counts below each group of `BLOCK` indices, without the last counts of one group.
     below: [u32; WINDOW / BLOCK],
+    /// That group, and the sum of these counts.
+    newest: (usize, u32),
     total: u32,
     /// Reciprocal of the total count plus the prior's weight.
     inverse: f32,
@@ -195,6 +189,7 @@ impl Frequencies {
         Self {
             counts: vec![[0; BLOCK]; WINDOW / BLOCK],
             below: [0; WINDOW / BLOCK],
+            newest: (0, 0),
             total: 0,
             inverse: 1.0 / PRIOR,
             cells,
@@ -211,9 +206,15 @@ impl Frequencies {
         let weight = if changed { CHANGED } else { 1 };
         let (block, place) = (offset as usize / BLOCK, offset as usize % BLOCK);
         self.counts[block][place] += weight;
-        // Visit all groups, so that the loop can be vectorised.
-        for (b, below) in (0_i32..).zip(&mut self.below) {
-            *below += if b > block as i32 { weight } else { 0 };
+        // Neighbouring rows are most often in one group, for which the sums are updated together.
+        if block == self.newest.0 {
+            self.newest.1 += weight;
+        } else {
+            let (newest, counted) = std::mem::replace(&mut self.newest, (block, weight));
+            // Visit all groups, so that the loop can be vectorised.
+            for (b, below) in (0_i32..).zip(&mut self.below) {
+                *below += if b > newest as i32 { counted } else { 0 };
+            }
         }
         self.total += weight;
         self.inverse = 1.0 / (self.total as f32 + PRIOR);
@@ -227,7 +228,7 @@ impl Frequencies {
         }
         let offset = offset.max(0) as usize;
         let (block, place) = (offset / BLOCK, (offset % BLOCK) as i32);
-        let mut sum = self.below[block];
+        let mut sum = self.below[block] + if block > self.newest.0 { self.newest.1 } else { 0 };
         for (i, count) in (0_i32..).zip(&self.counts[block]) {
             sum += if i < place { *count } else { 0 };
         }
@@ -259,8 +260,12 @@ impl Frequencies {
 
     #[inline(always)]
     fn fill(&self, below: u32, tails: &mut Tails) {
-        tails.below[COUNTED] = (below as i32 as f32 + PRIOR * tails.below[PREDICTED]) * self.inverse;
-        tails.above[COUNTED] = ((self.total - below) as i32 as f32 + PRIOR * tails.above[PREDICTED]) * self.inverse;
+        let law = |tail: &mut Lanes, counted: u32| {
+            let tail = tail.as_mut_array();
+            tail[COUNTED] = (counted as i32 as f32 + PRIOR * tail[PREDICTED]) * self.inverse;
+        };
+        law(&mut tails.below, below);
+        law(&mut tails.above, self.total - below);
     }
 
     /// As [`complete`](Self::complete), for both edges of the cell `first..next`.

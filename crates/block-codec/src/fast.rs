@@ -33,7 +33,7 @@ enum Choice {
 }
 
 /// The list of levels, what is coded of their numbers, and bits of a row; `None` if there are too many levels.
-fn few_levels(keys: impl ExactSizeIterator<Item = u64>) -> Option<(Levels, Plan, f32)> {
+fn few_levels(keys: impl ExactSizeIterator<Item = u64> + Clone) -> Option<(Levels, Plan, f32)> {
     let found = levels::levels(keys, Effort::Fast)?;
     let (list, numbers) = (&found.0, &found.1);
     let range = (list[list.len() - 1] - list[0]) as f32;

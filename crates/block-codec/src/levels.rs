@@ -58,12 +58,15 @@ pub(crate) fn sample_of_key(key: u64) -> f64 {
 
 /// The sorted levels and the number of each row's; `None` if there are too many to be worth a list, or no gaps between them. If `effort` is
 /// fast, the list must be short, also beside the rows so far.
-pub(crate) fn levels(keys: impl ExactSizeIterator<Item = u64>, effort: Effort) -> Option<(Vec<u64>, Vec<i64>)> {
+pub(crate) fn levels(keys: impl ExactSizeIterator<Item = u64> + Clone, effort: Effort) -> Option<(Vec<u64>, Vec<i64>)> {
     let most = (keys.len() / ROWS_PER_LEVEL).min(MOST_LEVELS);
     let (most, free) = match effort {
         Effort::Thorough => (most, most),
         Effort::Fast => (most.min(FEW_LEVELS), FREE_LEVELS),
     };
+    if effort == Effort::Thorough && are_dense(keys.clone()) {
+        return None;
+    }
     // Number of the level from one on, in the order of the rows; zero is a free slot, of which at least half are.
     let slot_bits = (2 * most + 2).next_power_of_two().ilog2();
     let mut slots = vec![0_u32; 1 << slot_bits];
@@ -100,6 +103,20 @@ pub(crate) fn levels(keys: impl ExactSizeIterator<Item = u64>, effort: Effort) -
         .for_each(|(rank, number)| ranks[*number] = rank as i64);
     numbers.iter_mut().for_each(|number| *number = ranks[*number as usize]);
     Some((sorted, numbers))
+}
+
+/// The same of keys in any order and number; also `false` if they are too far apart to be marked one by one.
+fn are_dense(keys: impl ExactSizeIterator<Item = u64> + Clone) -> bool {
+    let ends = |(low, high): (u64, u64), key: u64| (low.min(key), high.max(key));
+    let (low, high) = keys.clone().fold((u64::MAX, 0), ends);
+    let distance = high.saturating_sub(low);
+    if distance >= 2 * keys.len() as u64 {
+        return false;
+    }
+    let mut marks = vec![0_u8; distance as usize + 1];
+    keys.for_each(|key| marks[(key - low) as usize] = 1);
+    let levels: u64 = marks.into_iter().map(u64::from).sum();
+    levels < 2 || distance < 2 * levels
 }
 
 /// Whether at least every second key from the lowest to the highest is a level.

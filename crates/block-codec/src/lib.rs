@@ -43,6 +43,7 @@ pub mod frame;
 mod grid;
 mod head;
 mod indices;
+mod lanes;
 mod learned;
 mod levels;
 mod mixer;

@@ -7,15 +7,14 @@
 //!
 //! All inputs of a decision are in one array, so that vector instructions process them together.
 
+use crate::lanes::{Lanes, bits, greater, lesser, log2};
 use crate::priors::MIXER_WEIGHTS;
-use fewbits_node::elementary::{greater, lesser, log2, squash};
+use fewbits_node::elementary::squash;
+use wide::bytemuck::cast;
+use wide::u32x4;
 
 /// Number of contexts in which outcomes are counted.
 pub(crate) const CONTEXTS: usize = 4;
-/// Number of experts. Their inputs follow those of the contexts.
-pub(crate) const EXPERTS: usize = 4;
-/// Number of inputs: they fill a vector register.
-pub(crate) const INPUTS: usize = CONTEXTS + EXPERTS;
 /// Number of classes of decisions, each with its own weights: zero, sign, three magnitudes, further ones, inside an interval, low bits.
 pub(crate) const CLASSES: usize = 8;
 /// Largest size of the log odds of a decision and of an input, in bits.
@@ -42,10 +41,6 @@ const WHOLE: f32 = 8_388_608.0;
 /// Outcomes of a decision in one context: probability of `true` (high 16 bits), how often seen (8 bits), a few bits of the hash, never 0.
 type Slot = u32;
 
-fn seen(slot: Slot) -> u32 {
-    slot >> 8 & 255
-}
-
 /// Contexts, experts' inputs and weights.
 #[derive(Debug, Clone)]
 pub(crate) struct Mixer {
@@ -55,17 +50,18 @@ pub(crate) struct Mixer {
     pairs: u32,
     /// Hashes of the contexts of this row.
     pub(crate) contexts: [u32; CONTEXTS],
-    /// Shares of the two outcomes. The caller sets those of the experts before each decision.
-    yes: [f32; INPUTS],
-    no: [f32; INPUTS],
-    weights: Box<[[f32; INPUTS]; CLASSES]>,
+    /// Probability of `true` in each context, and the odds of the experts, which the caller sets before each decision.
+    yes: Lanes,
+    odds: Lanes,
+    /// Of contexts and of experts.
+    weights: Box<[[Lanes; 2]; CLASSES]>,
     decisions: [f32; CLASSES],
     class: usize,
     /// The slots of the present decision: their places, hash bits, and numbers of occurrences.
     places: [u32; CONTEXTS],
-    checks: [u32; CONTEXTS],
-    seen: [f32; CONTEXTS],
-    inputs: [f32; INPUTS],
+    checks: u32x4,
+    seen: Lanes,
+    inputs: [Lanes; 2],
     p: f32,
 }
 
@@ -77,15 +73,15 @@ impl Mixer {
             slots: vec![[0; 2]; CONTEXTS * pairs],
             pairs: pairs as u32,
             contexts: [0; CONTEXTS],
-            yes: [1.0; INPUTS],
-            no: [1.0; INPUTS],
-            weights: Box::new(MIXER_WEIGHTS),
+            yes: Lanes::HALF,
+            odds: Lanes::ONE,
+            weights: Box::new(MIXER_WEIGHTS.map(|weights| weights.map(Lanes::new))),
             decisions: [0.0; CLASSES],
             class: 0,
             places: [0; CONTEXTS],
-            checks: [0; CONTEXTS],
-            seen: [0.0; CONTEXTS],
-            inputs: [0.0; INPUTS],
+            checks: u32x4::ZERO,
+            seen: Lanes::ZERO,
+            inputs: [Lanes::ZERO; 2],
             p: 0.5,
         }
     }
@@ -112,51 +108,37 @@ impl Mixer {
         for c in 0..CONTEXTS {
             [first[c], second[c]] = self.slots[(places[c] >> 1) as usize];
         }
-        for c in 0..CONTEXTS {
-            let (a, b, check) = (first[c], second[c], checks[c]);
-            // Each bucket has two slots. The check byte identifies the context; if neither matches, replace the slot with fewer
-            // occurrences.
-            let is_second = (b & 255 == check) | ((a & 255 != check) & (seen(b) < seen(a)));
-            let slot = if is_second { b } else { a };
-            places[c] |= u32::from(is_second);
-            let times = if slot & 255 == check { seen(slot) } else { 0 };
-            self.seen[c] = times as i32 as f32;
-            self.yes[c] = ((slot >> 16) as i32 as f32 + 0.5) * (1.0 / UNITS);
-            self.no[c] = 1.0 - self.yes[c];
-        }
-        (self.places, self.checks) = (places, checks);
+        // Each bucket has two slots. The check byte identifies the context; if neither matches, replace the slot with fewer
+        // occurrences.
+        let (a, b, checks) = (u32x4::new(first), u32x4::new(second), u32x4::new(checks));
+        let byte = u32x4::splat(255);
+        let fewer = ((b >> 8_u32) & byte).simd_lt((a >> 8_u32) & byte);
+        let is_second = (b & byte).simd_eq(checks) | (!(a & byte).simd_eq(checks) & fewer);
+        let slot = is_second.bitselect(b, a);
+        let times = (slot & byte).simd_eq(checks) & ((slot >> 8_u32) & byte);
+        self.seen = Lanes::from_i32x4(cast(times));
+        self.yes = (Lanes::from_i32x4(cast(slot >> 16_u32)) + 0.5) * (1.0 / UNITS);
+        self.places = (u32x4::new(places) | (is_second & u32x4::ONE)).to_array();
+        self.checks = checks;
     }
 
     /// Sets the shares that the experts give to the two outcomes.
     #[inline(always)]
-    pub(crate) fn set_experts(&mut self, yes: [f32; EXPERTS], no: [f32; EXPERTS]) {
-        for e in 0..EXPERTS {
-            self.yes[CONTEXTS + e] = greater(yes[e], LEAST);
-            self.no[CONTEXTS + e] = greater(no[e], LEAST);
-        }
+    pub(crate) fn set_experts(&mut self, yes: Lanes, no: Lanes) {
+        self.odds = greater(yes, LEAST) / greater(no, LEAST);
     }
 
     /// Probability that the decision looked up is `true`: in units of `2^-16`, in `1..2^16`.
     #[inline(always)]
     pub(crate) fn predict(&mut self) -> u32 {
-        let mut inputs = [0.0; INPUTS];
-        for i in 0..INPUTS {
-            let odds = log2(self.yes[i] / self.no[i]);
-            inputs[i] = greater(lesser(odds, FARTHEST_INPUT), -FARTHEST_INPUT);
-        }
+        let input = |odds: Lanes| greater(lesser(log2(odds), FARTHEST_INPUT), -FARTHEST_INPUT);
         // Few occurrences say little: the log odds of a rarely seen context are reduced.
-        for c in 0..CONTEXTS {
-            inputs[c] *= self.seen[c] / (self.seen[c] + HALF_CONFIDENCE);
-        }
-        let weights = &self.weights[self.class];
-        let mut terms = [0.0; INPUTS];
-        for i in 0..INPUTS {
-            terms[i] = weights[i] * inputs[i];
-        }
-        self.inputs = inputs;
+        let confidence = self.seen / (self.seen + HALF_CONFIDENCE);
+        self.inputs = [input(self.yes / (Lanes::ONE - self.yes)) * confidence, input(self.odds)];
+        let [contexts, experts] = self.weights[self.class];
         // Summed in pairs, so that fewer additions depend on each other.
-        let [a, b, c, d, e, f, g, h] = terms;
-        let sum = ((a + e) + (b + f)) + ((c + g) + (d + h));
+        let [a, b, c, d] = (contexts * self.inputs[0] + experts * self.inputs[1]).to_array();
+        let sum = (a + b) + (c + d);
         self.p = squash(sum.clamp(-FARTHEST, FARTHEST));
         ((self.p * UNITS) as u32).clamp(1, 65535)
     }
@@ -169,26 +151,21 @@ impl Mixer {
         *decisions += 1.0;
         let target = f32::from(u8::from(bit));
         let change = rate * (target - self.p);
-        let weights = &mut self.weights[self.class];
-        for i in 0..INPUTS {
-            weights[i] += change * self.inputs[i];
+        for (weights, inputs) in self.weights[self.class].iter_mut().zip(self.inputs) {
+            *weights += inputs * change;
         }
         // A new context starts from the mixed probability.
         let mixed = self.p.clamp(LEAST_FIRST / UNITS, 1.0 - LEAST_FIRST / UNITS);
-        let mut slots = [0; CONTEXTS];
-        for c in 0..CONTEXTS {
-            let seen = self.seen[c];
-            let one = if seen == 0.0 { mixed } else { self.yes[c] };
-            // The mean of the outcomes, in which the first estimate counts as half an outcome.
-            let moved = (one + (target - one) / (seen + 1.5)) * UNITS;
-            let moved = greater(lesser(moved, UNITS - LEAST_UNITS), LEAST_UNITS);
-            let times = lesser(seen + 1.0, MOST_SEEN);
-            // Probability, occurrences and hash bits in one word.
-            slots[c] = (moved + WHOLE).to_bits() << 16 | ((times + WHOLE).to_bits() & 255) << 8 | self.checks[c];
-        }
-        for c in 0..CONTEXTS {
-            let place = self.places[c] as usize;
-            self.slots[place >> 1][place & 1] = slots[c];
+        let one = self.seen.simd_eq(Lanes::ZERO).bitselect(Lanes::splat(mixed), self.yes);
+        // The mean of the outcomes, in which the first estimate counts as half an outcome.
+        let moved = (one + (Lanes::splat(target) - one) / (self.seen + 1.5)) * UNITS;
+        let moved = greater(lesser(moved, UNITS - LEAST_UNITS), LEAST_UNITS);
+        let times = lesser(self.seen + 1.0, MOST_SEEN);
+        // Probability, occurrences and hash bits in one word.
+        let times = (bits(times + WHOLE) & u32x4::splat(255)) << 8_u32;
+        let slots = (bits(moved + WHOLE) << 16_u32 | times | self.checks).to_array();
+        for (place, slot) in self.places.into_iter().zip(slots) {
+            self.slots[(place >> 1) as usize][(place & 1) as usize] = slot;
         }
     }
 }

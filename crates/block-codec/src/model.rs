@@ -9,8 +9,9 @@
 
 use crate::arithmetic::Coder;
 use crate::error::Damaged;
-use crate::experts::{Frequencies, LeastSquares, PREDICTED, Tails, Tracks};
-use crate::mixer::{EXPERTS, Mixer};
+use crate::experts::{Frequencies, LeastSquares, Tails, Tracks};
+use crate::lanes::Lanes;
+use crate::mixer::Mixer;
 use crate::rows::{JOINT_COLUMNS, LARGEST, State, damaged};
 use fewbits_node::elementary::round;
 
@@ -28,11 +29,6 @@ const LOW: u32 = 44;
 const CLASS_MAGNITUDES: usize = 2;
 const CLASS_INSIDE: usize = 6;
 const CLASS_LOW: usize = 7;
-
-/// Numbers of the predictions: the last index, least squares, and least squares with other columns or else the slow mean.
-const HOLD: usize = 0;
-const RECURSION: usize = PREDICTED;
-const THIRD: usize = 2;
 
 impl State for Model {
     fn last(&self) -> i64 {
@@ -150,15 +146,6 @@ impl Rests {
     }
 }
 
-#[inline(always)]
-fn less(a: [f32; EXPERTS], b: [f32; EXPERTS]) -> [f32; EXPERTS] {
-    let mut differences = a;
-    for e in 0..EXPERTS {
-        differences[e] -= b[e];
-    }
-    differences
-}
-
 impl Model {
     /// The state after the first index of a block of `rows` rows. `cells`: number of points on a circle. `rests`: whether contexts have the
     /// lengths of rests.
@@ -187,8 +174,8 @@ impl Model {
         let level = self.last as f64 - self.slow;
         let lags = [d0 as f64, d1 as f64, d2 as f64, d3 as f64];
         self.squares.regressors = [lags[0], lags[1], lags[2], level];
-        self.tracks.at[RECURSION] = self.squares.predict();
-        self.tracks.at[THIRD] = match &mut self.joint {
+        let recursion = self.squares.predict();
+        let third = match &mut self.joint {
             Some(squares) => {
                 let [a, b, c] = others;
                 squares.regressors = [a, b, c, lags[0], lags[1], lags[2], lags[3], level];
@@ -196,12 +183,13 @@ impl Model {
             }
             None => -level as f32,
         };
+        self.tracks.at = Lanes::new([0.0, recursion, third, 0.0]);
         // The last index is preferred to a prediction that is only a little better.
-        let (at, errors) = (&self.tracks.at, &self.tracks.errors);
-        let mut best = (errors[HOLD] * 0.96, 0.0);
-        for track in [RECURSION, THIRD] {
-            if errors[track] < best.0 {
-                best = (errors[track], at[track]);
+        let [hold, of_recursion, of_third, _] = self.tracks.errors.to_array();
+        let mut best = (hold * 0.96, 0.0);
+        for (error, at) in [(of_recursion, recursion), (of_third, third)] {
+            if error < best.0 {
+                best = (error, at);
             }
         }
         // Predictions are within 2^22, where rounding is exact.
@@ -267,17 +255,11 @@ impl Model {
         ];
         self.frequencies.complete_cell(first, next, grid.centre, &mut tails);
         let [low, high] = tails;
-        let (mut inside, mut outside) = ([0.0; EXPERTS], [0.0; EXPERTS]);
-        for e in 0..EXPERTS {
-            outside[e] = low.below[e] + high.above[e];
-            // Of the equivalent expressions for the share inside, use the one with the least cancellation.
-            let beside = if low.below[e] > 0.5 {
-                low.above[e] - high.above[e]
-            } else {
-                high.below[e] - low.below[e]
-            };
-            inside[e] = if outside[e] < 0.5 { 1.0 - outside[e] } else { beside };
-        }
+        let outside = low.below + high.above;
+        // Of the equivalent expressions for the share inside, use the one with the least cancellation.
+        let is_upper = low.below.simd_gt(Lanes::HALF);
+        let beside = is_upper.bitselect(low.above - high.above, high.below - low.below);
+        let inside = outside.simd_lt(Lanes::HALF).bitselect(Lanes::ONE - outside, beside);
         self.mixer.set_experts(inside, outside);
         if self.decide_one(coder, wanted.is_some_and(|j| (first..next).contains(&j))) {
             return Ok(self.low_bits(coder, grid, first, wanted));
@@ -300,7 +282,7 @@ impl Model {
             self.mixer.look_up(node, CLASS_MAGNITUDES + count.min(3));
             let edge = grid.edge(begin + width, up);
             far = side(self.tails(grid, edge));
-            self.mixer.set_experts(far, less(near, far));
+            self.mixer.set_experts(far, near - far);
             if !self.decide_one(coder, is_beyond(edge)) {
                 break;
             }
@@ -318,7 +300,7 @@ impl Model {
             let middle = begin + (end - begin) / 2;
             let edge = grid.edge(middle, up);
             let between = side(self.tails(grid, edge));
-            self.mixer.set_experts(less(between, far), less(near, between));
+            self.mixer.set_experts(between - far, near - between);
             if self.decide_one(coder, is_beyond(edge)) {
                 (begin, near) = (middle, between);
             } else {
@@ -341,13 +323,9 @@ impl Model {
             let c = self.tails(grid, index + 2 * half);
             // Probabilities of the upper and lower half from each expert's distribution. In the upper tail they come from the survival
             // function, which keeps its digits there.
-            let (mut upper, mut lower) = (less(c.below, b.below), less(b.below, a.below));
-            let (above, beneath) = (less(b.above, c.above), less(a.above, b.above));
-            for e in 0..EXPERTS {
-                if a.below[e] >= 0.5 {
-                    (upper[e], lower[e]) = (above[e], beneath[e]);
-                }
-            }
+            let is_upper = a.below.simd_ge(Lanes::HALF);
+            let upper = is_upper.bitselect(b.above - c.above, c.below - b.below);
+            let lower = is_upper.bitselect(a.above - b.above, b.below - a.below);
             self.mixer.set_experts(upper, lower);
             if self.decide_one(coder, wanted.is_some_and(|j| j >= index + half)) {
                 index += half;
