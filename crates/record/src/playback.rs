@@ -8,6 +8,7 @@ use crate::header::Header;
 use crate::index::{self, END, Entry, Segment, TRAILER_BYTES};
 use crate::scan::Scanner;
 use crate::schema::Schema;
+use crate::wire::read;
 use std::fs::File;
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -262,10 +263,10 @@ pub(crate) fn index_of(reader: &mut (impl Read + Seek), header: &Header) -> Resu
     let first = header.length as u64;
     let (found, expected) = match index::read_special(header, &bytes) {
         Ok((index::FOOTER, content, whole)) if whole as u64 == length => {
-            (index::read_footer(header, content, first), start)
+            (read(content, |fields| index::footer(fields, header, &[])), start)
         }
         Ok((index::ONLY, content, whole)) if whole as u64 == length => {
-            let entries = index::read_segment(header, content);
+            let entries = read(content, |fields| index::segment(fields, header, &[]));
             (entries.map(|entries| vec![Segment::new(first, length, &entries)]), trailer)
         }
         _ => return Ok(without),
@@ -286,7 +287,9 @@ pub(crate) fn entries(
         return Ok(None);
     };
     let found = match index::read_special(header, &bytes) {
-        Ok((index::SEGMENT | index::ONLY, content, _)) => index::read_segment(header, content).ok(),
+        Ok((index::SEGMENT | index::ONLY, content, _)) => {
+            read(content, |fields| index::segment(fields, header, &[])).ok()
+        }
         _ => None,
     };
     let total = |entries: &Vec<Entry>| {

@@ -9,7 +9,7 @@ use crate::resume::{self, Opened};
 use crate::scan::{Kind, Scanner};
 use crate::schema::Schema;
 use crate::waiting::Waiting;
-use crate::wire::checked;
+use crate::wire::{checked, written};
 use fewbits_block_codec::Effort;
 use std::fs::File;
 use std::io::Write;
@@ -257,7 +257,10 @@ impl<W: Write> Recorder<W> {
         let is_only = self.segments.is_empty() && !self.entries.is_empty();
         self.write_segment(if is_only { index::ONLY } else { index::SEGMENT })?;
         let footer = match &self.header {
-            Some(header) if !is_only => index::push_footer(header, &self.segments),
+            Some(header) if !is_only => {
+                let content = written(|fields| index::footer(fields, header, &self.segments));
+                index::special(header.check, index::FOOTER, &content)
+            }
             _ => Vec::new(),
         };
         let length = if is_only {
@@ -274,7 +277,7 @@ impl<W: Write> Recorder<W> {
     /// The whole recording of the waiting rows as a single block.
     fn single(&self) -> Vec<u8> {
         let Waiting { ticks, columns, ranges } = &self.rows;
-        let plain = self.rows.header(&self.schema).of_single(ticks.len());
+        let plain = self.rows.header(&self.schema).with_form(Form::Single(ticks.len()));
         let own = ranges.own_bounds(&plain);
         let written = |header: &Header| {
             let (content, _) = block::content(header, 0, ticks, columns, &own, self.effort);
@@ -364,7 +367,7 @@ impl<W: Write> Recorder<W> {
         let Some(header) = &self.header else {
             return Err(Error::Broken);
         };
-        let content = index::push_segment(header, &self.entries);
+        let content = written(|fields| index::segment(fields, header, &self.entries));
         let bytes = index::special(header.check, kind, &content);
         self.write(&bytes)?;
         let segment = Segment::new(self.segment_start, bytes.len() as u64, &self.entries);

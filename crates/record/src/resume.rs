@@ -7,6 +7,7 @@ use crate::header::{Header, VERSION_5};
 use crate::index::{self, BLOCKS_PER_SEGMENT, Entry, Segment};
 use crate::playback::{self, Index};
 use crate::scan::{Kind, Scanner};
+use crate::wire::read;
 use std::fs::File;
 use std::io::{Seek, SeekFrom};
 use std::path::Path;
@@ -201,8 +202,9 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
 }
 
 fn index_agrees(header: &Header, bytes: &[u8], entries: &[Entry]) -> bool {
-    let read = index::read_special(header, bytes).and_then(|(_, content, _)| index::read_segment(header, content));
-    read.is_ok_and(|read| {
+    let content = index::read_special(header, bytes);
+    let found = content.and_then(|(_, content, _)| read(content, |fields| index::segment(fields, header, &[])));
+    found.is_ok_and(|read| {
         read.len() == entries.len()
             && read
                 .iter()

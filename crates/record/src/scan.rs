@@ -3,7 +3,7 @@
 use crate::block::{self, Block};
 use crate::error::{Damage, Error};
 use crate::header::{Header, MAX_HEADER};
-use crate::header_read::Known;
+use crate::header_bytes::Known;
 use crate::index::{self, TRAILER_BYTES};
 use crate::rolling::Prefixes;
 use crate::schema::{MAX_CELLS, Schema};

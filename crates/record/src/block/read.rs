@@ -10,7 +10,7 @@ use crate::error::{Damage, Error};
 use crate::header::{Header, VERSION_5};
 use crate::specials::{self, Specials};
 use crate::time::{self, TimeKind};
-use crate::wire::{Bytes, push_varint};
+use crate::wire::{Bytes, Fields, push_varint};
 use fewbits_block_codec::arithmetic::Reader;
 
 /// Decodes one block whose checksum was verified. Columns that are not `wanted` stay empty.
@@ -70,7 +70,8 @@ pub(crate) fn content_of(bytes: &[u8]) -> Result<&[u8], Damage> {
 pub(crate) fn renewed(header: &Header, content: &[u8], number: u64) -> Result<Vec<u8>, Damage> {
     let mut body = Bytes(content);
     let Head { usual, flags, .. } = read_head(header, &mut body)?;
-    let rows = header.odd_rows().filter(|_| flags & ROWS_FOLLOW == 0);
+    let rows =
+        Some(header.block_rows()).filter(|rows| *rows != header.schema.rows_per_block && flags & ROWS_FOLLOW == 0);
     let mut content = Vec::new();
     let first = 4 * number + 2 * u64::from(flags & APART != 0);
     if usual == Some(number) && rows.is_none() {
@@ -223,10 +224,13 @@ fn read_section<'a>(
         return Ok(Section { id, own, others, bytes });
     }
     let own = if descriptor & BOUND_FOLLOWS != 0 {
-        Some(read_bound(body)?)
+        Some(body.short_bound(0.0)?)
     } else {
         None
     };
+    if own == Some(0.0) {
+        return Err(Damage::Content("bound"));
+    }
     let mut others = Vec::new();
     if descriptor & OTHERS_FOLLOW != 0 {
         let count = usize::from(body.byte()?) + 1;
@@ -276,15 +280,5 @@ impl Section<'_> {
     fn share_bound(&self, header: &Header, column: usize) -> Option<f64> {
         let shared = matches!(header.schema.columns[column].bound, Bound::ShareOfRange(_));
         shared.then(|| self.own.unwrap_or(header.share_bounds[column]))
-    }
-}
-
-fn read_bound(body: &mut Bytes<'_>) -> Result<f64, Damage> {
-    let [a, b, c] = body.array()?;
-    let bound = f64::from_be_bytes([a, b, c, 0, 0, 0, 0, 0]);
-    if bound > 0.0 && (2.0 * bound).is_finite() {
-        Ok(bound)
-    } else {
-        Err(Damage::Content("bound"))
     }
 }

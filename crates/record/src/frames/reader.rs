@@ -5,7 +5,7 @@ use super::piece::Piece;
 use crate::block::{self, Block};
 use crate::error::{Damage, Error};
 use crate::header::{Header, MAX_HEADER};
-use crate::header_read::Known;
+use crate::header_bytes::Known;
 use crate::schema::Schema;
 use std::collections::{HashSet, VecDeque};
 use std::hash::{BuildHasher, RandomState};
