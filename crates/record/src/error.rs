@@ -128,6 +128,11 @@ impl Error {
         }
     }
 
+    /// Damage of so many bytes.
+    pub(crate) fn block(offset: u64, bytes: u64, damage: Damage) -> Self {
+        Self::Block { offset, bytes, damage }
+    }
+
     /// Damage of the header.
     pub(crate) fn header(damage: impl Into<Damage>) -> Self {
         Self::Header(damage.into())

@@ -185,7 +185,7 @@ impl Header {
     pub(crate) fn target(&self, column: usize, own: Option<f64>) -> Target {
         let spec = &self.schema.columns[column];
         Target {
-            promise: spec.promise(own.unwrap_or(self.share_bounds[column])),
+            bound: spec.bound_in(own.unwrap_or(self.share_bounds[column])),
             period: spec.period,
         }
     }

@@ -148,7 +148,11 @@ impl Header {
         let is_old = layout == Layout::Version5;
         if is_old {
             // Version 5 has no flags: origin and columns always follow.
-            kind = if kind < STREAM { kind | ORIGIN | COLUMNS } else { STREAM - 1 };
+            kind = if kind < STREAM {
+                kind | ORIGIN | COLUMNS
+            } else {
+                STREAM - 1
+            };
         }
         let time = match kind & !(STREAM | ORIGIN | COLUMNS | NAMED) {
             0 => TimeBase::Numbered,

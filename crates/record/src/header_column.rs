@@ -120,7 +120,7 @@ pub(crate) fn column<F: Fields>(
         column = column.with_earlier_bound(earlier).map_err(refused)?;
     }
     let target = Target {
-        promise: column.promise(bound_of_share),
+        bound: column.bound_in(bound_of_share),
         period: column.period,
     };
     let start = (kind & HAS_START != 0).then(|| fields.start(start, &target));

@@ -8,7 +8,6 @@ use crate::aggregate::{self, Aggregate};
 use crate::block::Cells;
 use crate::error::Damage;
 use crate::header::{Header, VERSION_5};
-use crate::ranges::Ends;
 use crate::wire::{Bytes, Fields, checked, read_checked, unzigzag, zigzag};
 
 /// Least number of rows per block with which the index has aggregates: those of a column take 25 bytes per block, of smaller blocks a larger part.
@@ -32,24 +31,31 @@ pub(crate) const TRAILER_BYTES: usize = 8;
 /// Largest length of a footer in bytes.
 const MAX_FOOTER: usize = 1 << 22;
 
-/// Entry of one block.
+/// What the index says of one block.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Entry {
-    /// Length of the whole block in bytes.
-    pub(crate) length: u64,
-    /// Number of rows; 0 for damaged bytes.
-    pub(crate) rows: u64,
-    pub(crate) ticks: (i64, i64),
-    /// Lower and upper bound of the finite values of each column; `None` if there are none.
-    pub(crate) ends: Vec<Ends>,
-    /// Aggregates of each column, if the index has them.
-    pub(crate) aggregates: Option<Vec<Aggregate>>,
+#[non_exhaustive]
+pub struct BlockInfo {
+    /// Offset of the first byte.
+    pub offset: u64,
+    /// Length in bytes.
+    pub bytes: u64,
+    /// Number of rows.
+    pub rows: u64,
+    /// Smallest and largest tick.
+    pub ticks: (i64, i64),
+    /// Lower and upper bound of each column's values (they exceed them by at most a 15th of the column's range in 1024 blocks); `None`
+    /// without values.
+    pub ends: Vec<Option<(f64, f64)>>,
+    /// Aggregates of each column. The index has them if blocks have 4096 rows or more; then [`ends`](Self::ends) are exact.
+    pub aggregates: Option<Vec<Aggregate>>,
 }
 
-impl Entry {
-    pub(crate) fn damaged(length: u64, columns: usize) -> Self {
+impl BlockInfo {
+    /// So many damaged bytes, which have no rows.
+    pub(crate) fn damaged(offset: u64, bytes: u64, columns: usize) -> Self {
         Self {
-            length,
+            offset,
+            bytes,
             rows: 0,
             ticks: (0, 0),
             ends: vec![None; columns],
@@ -57,19 +63,22 @@ impl Entry {
         }
     }
 
-    pub(crate) fn of(length: u64, ticks: &[i64], columns: &[Cells]) -> Self {
+    pub(crate) fn of(offset: u64, bytes: u64, ticks: &[i64], columns: &[Cells]) -> Self {
         let aggregates = aggregate::of_columns(columns);
-        let ticks = ticks
-            .iter()
-            .fold((i64::MAX, i64::MIN), |(l, h), tick| (l.min(*tick), h.max(*tick)));
         Self {
-            length,
-            rows: columns.first().map_or(0, |cells| cells.len() as u64),
-            ticks,
+            offset,
+            bytes,
+            rows: ticks.len() as u64,
+            ticks: ends(ticks.iter().map(|tick| (*tick, *tick))).unwrap_or((0, 0)),
             ends: aggregates.iter().map(Aggregate::ends).collect(),
             aggregates: Some(aggregates),
         }
     }
+}
+
+/// The smallest and the largest of pairs of these.
+pub(crate) fn ends(pairs: impl Iterator<Item = (i64, i64)>) -> Option<(i64, i64)> {
+    pairs.reduce(|(low, high), (first, last)| (low.min(first), high.max(last)))
 }
 
 /// Entry of one segment in the footer.
@@ -86,19 +95,15 @@ pub(crate) struct Segment {
 }
 
 impl Segment {
-    pub(crate) fn new(start: u64, length: u64, entries: &[Entry]) -> Self {
-        let filled = || entries.iter().filter(|entry| entry.rows > 0);
+    pub(crate) fn new(start: u64, length: u64, entries: &[BlockInfo]) -> Self {
+        let filled = entries.iter().filter(|entry| entry.rows > 0);
+        let sum = |of: fn(&BlockInfo) -> u64| entries.iter().map(of).fold(0, u64::saturating_add);
         Self {
             start,
-            blocks: entries
-                .iter()
-                .fold(0, |sum: u64, entry| sum.saturating_add(entry.length)),
+            blocks: sum(|entry| entry.bytes),
             length,
-            rows: entries.iter().fold(0, |sum: u64, entry| sum.saturating_add(entry.rows)),
-            ticks: (
-                filled().map(|entry| entry.ticks.0).min().unwrap_or(0),
-                filled().map(|entry| entry.ticks.1).max().unwrap_or(0),
-            ),
+            rows: sum(|entry| entry.rows),
+            ticks: ends(filled.map(|entry| entry.ticks)).unwrap_or((0, 0)),
         }
     }
 
@@ -208,8 +213,13 @@ fn level_value(level: u8, ends: (f64, f64)) -> f64 {
     }
 }
 
-/// The fields of a segment of these entries, of which a reader has none.
-pub(crate) fn segment<F: Fields>(fields: &mut F, header: &Header, own: &[Entry]) -> Result<Vec<Entry>, Damage> {
+/// The fields of a segment of these entries, of which a reader has none. The first block is at `offset`.
+pub(crate) fn segment<F: Fields>(
+    fields: &mut F,
+    header: &Header,
+    mut offset: u64,
+    own: &[BlockInfo],
+) -> Result<Vec<BlockInfo>, Damage> {
     let columns = header.schema.columns.len();
     let count = fields.count(own.len(), BLOCKS_PER_SEGMENT, "number of blocks")?;
     let is_aggregated = has_aggregates(header);
@@ -221,7 +231,7 @@ pub(crate) fn segment<F: Fields>(fields: &mut F, header: &Header, own: &[Entry])
         let (low, high) = all.map_or((1.0, 0.0), |(low, high)| (short_below(low), short_above(high)));
         scales.push((short(fields, low)?, short(fields, high)?));
     }
-    let blank = Entry::damaged(0, columns);
+    let blank = BlockInfo::damaged(0, 0, columns);
     let (mut entries, mut last, mut before) = (Vec::with_capacity(count), header.origin, None);
     let mut length = 0_u64;
     for i in 0..count {
@@ -230,11 +240,12 @@ pub(crate) fn segment<F: Fields>(fields: &mut F, header: &Header, own: &[Entry])
         let (distance, span) = (ticks.0.wrapping_sub(last), ticks.1.wrapping_sub(ticks.0));
         let is_same = before == Some((rows, distance, span));
         // Blocks with equal numbers of rows have similar lengths: the difference mostly fits into a byte.
-        let longer = zigzag(own.length.wrapping_sub(length) as i64);
+        let longer = zigzag(own.bytes.wrapping_sub(length) as i64);
         let head = fields.varint(longer << 1 | u64::from(is_same))?;
         // Any lengths can stand here: `playback::entries` compares their sum with the footer.
         length = length.wrapping_add(unzigzag(head >> 1) as u64);
-        let mut entry = Entry::damaged(length, columns);
+        let mut entry = BlockInfo::damaged(offset, length, columns);
+        offset = offset.saturating_add(length);
         let shape = if head & 1 == 1 {
             before.ok_or(Damage::Content("block like the one before"))?
         } else {
@@ -306,10 +317,11 @@ mod tests {
     #[test]
     fn ends_are_outside_the_values() {
         let values = [(-3.7, 12.25), (0.1, 0.3), (1e-9, 1e300), (-1e308, 1.6e308), (5.0, 5.0)];
-        let entries: Vec<Entry> = values
+        let entries: Vec<BlockInfo> = values
             .iter()
-            .map(|ends| Entry {
-                length: 9,
+            .map(|ends| BlockInfo {
+                offset: 0,
+                bytes: 9,
                 rows: 4,
                 ticks: (-5, 7),
                 ends: vec![Some(*ends), None, Some((0.3, 0.3))],
@@ -320,8 +332,8 @@ mod tests {
         let schema = Schema::new(columns.to_vec(), TimeBase::Numbered).unwrap();
         let schema = schema.with_rows_per_block(512).unwrap();
         let header = Header::new(schema, &[3], vec![0.0; 3]);
-        let bytes = written(|fields| segment(fields, &header, &entries));
-        let read = read(&bytes, |fields| segment(fields, &header, &[])).unwrap();
+        let bytes = written(|fields| segment(fields, &header, 0, &entries));
+        let read = read(&bytes, |fields| segment(fields, &header, 0, &[])).unwrap();
         for (entry, (low, high)) in read.iter().zip(values) {
             let (l, h) = entry.ends[0].unwrap();
             assert!(l <= low && h >= high, "{l} {low} {high} {h}");

@@ -4,7 +4,7 @@ use crate::append::{self, Append};
 use crate::block::{self, Block};
 use crate::error::{Damage, Error};
 use crate::header::{Form, Header};
-use crate::index::{self, BLOCKS_PER_SEGMENT, Entry, Segment};
+use crate::index::{self, BLOCKS_PER_SEGMENT, BlockInfo, Segment};
 use crate::resume::{self, Opened};
 use crate::scan::{Kind, Scanner};
 use crate::schema::Schema;
@@ -17,13 +17,6 @@ use std::path::Path;
 
 /// Largest number of rows of a single block for which a code that its columns share is tried.
 const SHARED_ROWS: usize = 1 << 13;
-
-/// Whether a new header contains starts of the columns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Starts {
-    None,
-    Learned,
-}
 
 /// Writes rows in blocks.
 ///
@@ -42,7 +35,7 @@ pub struct Recorder<W> {
     offset: u64,
     /// Offset of the first block of the present segment.
     segment_start: u64,
-    entries: Vec<Entry>,
+    entries: Vec<BlockInfo>,
     segments: Vec<Segment>,
     /// Number of the next block.
     next_number: u64,
@@ -202,12 +195,12 @@ impl<W: Write> Recorder<W> {
         let rows_per_block = self.schema.rows_per_block;
         // The first block waits for one row more: if none follows, the recording is a single block, which takes fewer bytes.
         if self.rows.ticks.len() == rows_per_block && row.len() == self.rows.columns.len() {
-            self.write_block(Starts::Learned)?;
+            self.write_block()?;
         }
         self.rows.push(tick, row)?;
         self.next_tick = tick.wrapping_add(1);
         if self.rows.ticks.len() == rows_per_block && self.header.is_some() {
-            self.write_block(Starts::Learned)?;
+            self.write_block()?;
         }
         Ok(())
     }
@@ -229,7 +222,7 @@ impl<W: Write> Recorder<W> {
             return Err(Error::Broken);
         }
         if !self.rows.ticks.is_empty() {
-            self.write_block(Starts::Learned)?;
+            self.write_block()?;
         }
         self.writer.flush().map_err(Error::io("write"))?;
         self.append.commit()
@@ -250,9 +243,9 @@ impl<W: Write> Recorder<W> {
             return Ok(self.writer);
         }
         if !self.rows.ticks.is_empty() {
-            self.write_block(Starts::None)?;
+            self.write_block()?;
         }
-        self.write_header(Starts::None)?;
+        self.write_header()?;
         // A single segment is also the footer.
         let is_only = self.segments.is_empty() && !self.entries.is_empty();
         self.write_segment(if is_only { index::ONLY } else { index::SEGMENT })?;
@@ -276,16 +269,12 @@ impl<W: Write> Recorder<W> {
 
     /// The whole recording of the waiting rows as a single block.
     fn single(&self) -> Vec<u8> {
-        let Waiting { ticks, columns, ranges } = &self.rows;
-        let plain = self.rows.header(&self.schema).with_form(Form::Single(ticks.len()));
-        let own = ranges.own_bounds(&plain);
-        let written = |header: &Header| {
-            let (content, _) = block::content(header, 0, ticks, columns, &own, self.effort);
-            header.single(&content)
-        };
+        let (columns, rows) = (&self.rows.columns, self.rows.ticks.len());
+        let plain = self.rows.header(&self.schema).with_form(Form::Single(rows));
+        let written = |header: &Header| header.single(&self.rows.first(rows, header, 0, self.effort).content().0);
         let apart = written(&plain);
         // Columns with starts share one code. It is shorter if they have few rows or help each other.
-        let is_worth_it = columns.len() > 1 && ticks.len() <= SHARED_ROWS && self.effort == Effort::Thorough;
+        let is_worth_it = columns.len() > 1 && rows <= SHARED_ROWS && self.effort == Effort::Thorough;
         let shared = is_worth_it.then(|| written(&plain.with_starts(columns)));
         match shared {
             Some(shared) if shared.len() < apart.len() => shared,
@@ -304,7 +293,7 @@ impl<W: Write> Recorder<W> {
         Ok(())
     }
 
-    fn write_header(&mut self, starts: Starts) -> Result<(), Error> {
+    fn write_header(&mut self) -> Result<(), Error> {
         if self.header.is_some() {
             return Ok(());
         }
@@ -312,10 +301,7 @@ impl<W: Write> Recorder<W> {
         if let Some(identity) = self.identity {
             header = header.with_identity(identity);
         }
-        if starts == Starts::Learned {
-            header = header.with_starts(&self.rows.columns);
-        }
-        self.put_header(header)
+        self.put_header(header.with_starts(&self.rows.columns))
     }
 
     fn put_header(&mut self, header: Header) -> Result<(), Error> {
@@ -330,12 +316,12 @@ impl<W: Write> Recorder<W> {
         let content = block::renewed(old, content, self.next_number)?;
         let check = self.header.as_ref().map_or(0, |header| header.check);
         let bytes = checked(check, &[], &content);
-        let entry = Entry::of(bytes.len() as u64, &block.ticks, &block.columns);
+        let entry = BlockInfo::of(self.offset, bytes.len() as u64, &block.ticks, &block.columns);
         Ok(self.put(&bytes, entry))
     }
 
     /// Puts a block behind the others, and a segment of the index if it is full.
-    fn put(&mut self, bytes: &[u8], entry: Entry) -> Result<(), Error> {
+    fn put(&mut self, bytes: &[u8], entry: BlockInfo) -> Result<(), Error> {
         self.write(bytes)?;
         self.entries.push(entry);
         self.next_number += 1;
@@ -345,18 +331,17 @@ impl<W: Write> Recorder<W> {
         Ok(())
     }
 
-    fn write_block(&mut self, starts: Starts) -> Result<(), Error> {
-        self.write_header(starts)?;
+    fn write_block(&mut self) -> Result<(), Error> {
+        self.write_header()?;
         let Some(header) = &self.header else {
             return Err(Error::Broken);
         };
-        let Waiting { ticks, columns, ranges } = &self.rows;
-        let own = ranges.own_bounds(header);
-        let (bytes, restored) = block::encode(header, self.next_number, ticks, columns, &own, self.effort);
+        let rows = self.rows.ticks.len();
+        let (bytes, restored) = self.rows.first(rows, header, self.next_number, self.effort).block();
         // The index has the ends of what a reader gets, which may lie outside those of the samples.
-        let entry = Entry::of(bytes.len() as u64, ticks, &restored);
+        let entry = BlockInfo::of(self.offset, bytes.len() as u64, &self.rows.ticks, &restored);
         self.put(&bytes, entry)?;
-        self.rows.remove(self.rows.ticks.len());
+        self.rows.remove(rows);
         Ok(())
     }
 
@@ -367,7 +352,7 @@ impl<W: Write> Recorder<W> {
         let Some(header) = &self.header else {
             return Err(Error::Broken);
         };
-        let content = written(|fields| index::segment(fields, header, &self.entries));
+        let content = written(|fields| index::segment(fields, header, 0, &self.entries));
         let bytes = index::special(header.check, kind, &content);
         self.write(&bytes)?;
         let segment = Segment::new(self.segment_start, bytes.len() as u64, &self.entries);

@@ -35,11 +35,7 @@ pub(crate) struct Found {
 impl Found {
     /// Damage of this record.
     pub(crate) fn damaged(&self, damage: Damage) -> Error {
-        Error::Block {
-            offset: self.offset,
-            bytes: self.length as u64,
-            damage,
-        }
+        Error::block(self.offset, self.length as u64, damage)
     }
 }
 
@@ -221,20 +217,12 @@ impl Scanner {
                     let Some(damage) = first else { return Ok(Some(found)) };
                     // The damage is reported first, and the record after it by the next call.
                     self.pending = Some(found);
-                    return Err(Error::Block {
-                        offset: start,
-                        bytes: found.offset - start,
-                        damage,
-                    });
+                    return Err(Error::block(start, found.offset - start, damage));
                 }
                 Err(Damage::CutOff) if !self.ended => self.fill(reader)?,
                 Err(_) if self.position == self.buffer.len() => {
                     let Some(damage) = first else { return Ok(None) };
-                    return Err(Error::Block {
-                        offset: start,
-                        bytes: self.consumed() - start,
-                        damage,
-                    });
+                    return Err(Error::block(start, self.consumed() - start, damage));
                 }
                 Err(damage) => {
                     // Try the next byte. Bytes that are no record pass for one with probability 2^-32, by the checksum.
@@ -271,16 +259,11 @@ impl Scanner {
             let Some(damage) = self.order.judge(block.number) else {
                 return Some(Ok(block));
             };
-            self.misses_others = (damage == Damage::Missing).then_some(block);
-            return Some(Err(Error::Block {
-                offset: found.offset,
-                bytes: if damage == Damage::Missing {
-                    0
-                } else {
-                    found.length as u64
-                },
-                damage,
-            }));
+            if damage == Damage::Missing {
+                self.misses_others = Some(block);
+                return Some(Err(Error::block(found.offset, 0, damage)));
+            }
+            return Some(Err(found.damaged(damage)));
         }
     }
 
@@ -359,16 +342,7 @@ impl<R: Read> BlockReader<R> {
     /// The end, or an error once if there should be one and is none.
     fn end(&mut self) -> Option<Result<Block, Error>> {
         let is_told = self.scanner.has_end || !self.header.has_end() || std::mem::replace(&mut self.told_end, true);
-        (!is_told).then(|| Err(no_bytes(self.scanner.consumed(), Damage::NoEnd)))
-    }
-}
-
-/// Damage that has no bytes of its own.
-pub(crate) fn no_bytes(offset: u64, damage: Damage) -> Error {
-    Error::Block {
-        offset,
-        bytes: 0,
-        damage,
+        (!is_told).then(|| Err(Error::block(self.scanner.consumed(), 0, Damage::NoEnd)))
     }
 }
 

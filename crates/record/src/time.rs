@@ -9,7 +9,7 @@
 //!
 //! The first kind that is within the tolerance is used. All arithmetic is exact in 128 bits.
 
-use crate::bound::Promise;
+use crate::bound::Bound;
 use crate::codec::{self, CodecId, Context, Target};
 use crate::error::Damage;
 use crate::wire::{Bytes, push_varint, zigzag};
@@ -48,7 +48,7 @@ pub(crate) struct Grid {
 const MAX_BLOCK: i128 = 1 << 60;
 
 const INTEGERS: Target = Target {
-    promise: Promise::Exact,
+    bound: Bound::Lossless,
     period: None,
 };
 

@@ -29,33 +29,19 @@ struct Head {
 fn read_head(header: &Header, body: &mut Bytes<'_>) -> Result<Head, Damage> {
     let head = body.varint()?;
     let apart = (head >> 1 & 1) * APART;
-    Ok(match (header.version, head & 1) {
-        (VERSION_5, 0) => Head {
-            number: None,
-            usual: Some(head >> 2),
-            flags: apart,
+    let (is_old, has_flags) = (header.version == VERSION_5, head & 1 == 1);
+    let flags = match (has_flags, is_old) {
+        (false, _) => apart,
+        (true, true) => head >> 1,
+        (true, false) => match body.varint()? {
+            flags if flags & APART == 0 => flags | apart,
+            _ => return Err(Damage::Content("flags")),
         },
-        (VERSION_5, _) => Head {
-            number: None,
-            usual: None,
-            flags: head >> 1,
-        },
-        (_, 0) => Head {
-            number: Some(head >> 2),
-            usual: Some(head >> 2),
-            flags: apart,
-        },
-        _ => {
-            let flags = body.varint()?;
-            if flags & APART != 0 {
-                return Err(Damage::Content("flags"));
-            }
-            Head {
-                number: Some(head >> 2),
-                usual: None,
-                flags: flags | apart,
-            }
-        }
+    };
+    Ok(Head {
+        number: (!is_old).then_some(head >> 2),
+        usual: (!has_flags).then_some(head >> 2),
+        flags,
     })
 }
 
@@ -97,11 +83,7 @@ pub(crate) fn only(
     bytes: u64,
     wanted: impl Fn(usize) -> bool,
 ) -> Result<Block, Error> {
-    decode_content(header, content, wanted).map_err(|damage| Error::Block {
-        offset: 0,
-        bytes,
-        damage,
-    })
+    decode_content(header, content, wanted).map_err(|damage| Error::block(0, bytes, damage))
 }
 
 /// Decodes the content of a block.

@@ -99,81 +99,50 @@ fn encode_column(
     }
 }
 
-/// A block's bytes, and the cells as a reader will restore them. `number` is that of the block in its recording.
-pub(crate) fn encode(
-    header: &Header,
-    number: u64,
-    ticks: &[i64],
-    columns: &[Cells],
-    own_bounds: &[Option<f64>],
-    effort: Effort,
-) -> (Vec<u8>, Vec<Cells>) {
-    let (content, restored) = content(header, number, ticks, columns, own_bounds, effort);
-    (checked(header.check, &[], &content), restored)
-}
-
-/// As [`encode`], without length and checksum.
-pub(crate) fn content(
-    header: &Header,
-    number: u64,
-    ticks: &[i64],
-    columns: &[Cells],
-    own_bounds: &[Option<f64>],
-    effort: Effort,
-) -> (Vec<u8>, Vec<Cells>) {
-    let may_share = columns.len() <= SHARED_COLUMNS;
-    let rows = Rows {
-        header,
-        number,
-        ticks,
-        columns,
-        own_bounds,
-        effort,
-    };
-    let (content, restored, shares) = rows.encoded(may_share);
-    // Columns with bytes of their own were verified one by one.
-    let is_read = || {
-        let read = decode_content(header, &content, |_| true);
-        let read = read.map(|block| block.columns).unwrap_or_default();
-        let bits = |columns: &[Cells]| {
-            columns
-                .iter()
-                .flatten()
-                .map(|cell| cell.map(f64::to_bits))
-                .collect::<Vec<_>>()
-        };
-        bits(&read) == bits(&restored)
-    };
-    if !shares || is_read() {
-        return (content, restored);
-    }
-    let (content, restored, _) = rows.encoded(false);
-    (content, restored)
-}
-
 /// The rows of a block, and what their code depends on.
-struct Rows<'a> {
-    header: &'a Header,
-    number: u64,
-    ticks: &'a [i64],
-    columns: &'a [Cells],
-    own_bounds: &'a [Option<f64>],
-    effort: Effort,
+pub(crate) struct Rows<'a> {
+    pub(crate) header: &'a Header,
+    /// That of the block in its recording.
+    pub(crate) number: u64,
+    pub(crate) ticks: &'a [i64],
+    pub(crate) columns: Vec<&'a [Option<f64>]>,
+    /// The bounds that the block must state itself.
+    pub(crate) own_bounds: Vec<Option<f64>>,
+    pub(crate) effort: Effort,
 }
 
 impl Rows<'_> {
+    /// The block's bytes, and the cells as a reader will restore them.
+    pub(crate) fn block(&self) -> (Vec<u8>, Vec<Cells>) {
+        let (content, restored) = self.content();
+        (checked(self.header.check, &[], &content), restored)
+    }
+
+    /// As [`block`](Self::block), without length and checksum.
+    pub(crate) fn content(&self) -> (Vec<u8>, Vec<Cells>) {
+        let (content, restored, shares) = self.encoded(self.columns.len() <= SHARED_COLUMNS);
+        // Columns with bytes of their own were verified one by one.
+        let is_read = || {
+            let read = decode_content(self.header, &content, |_| true);
+            let read = read.map(|block| block.columns).unwrap_or_default();
+            let bits = |columns: &[Cells]| -> Vec<_> {
+                let cells = columns.iter().flatten();
+                cells.map(|cell| cell.map(f64::to_bits)).collect()
+            };
+            bits(&read) == bits(&restored)
+        };
+        if !shares || is_read() {
+            return (content, restored);
+        }
+        let (content, restored, _) = self.encoded(false);
+        (content, restored)
+    }
+
     /// The content without verifying the shared code. The third value says whether there is one.
     fn encoded(&self, may_share: bool) -> (Vec<u8>, Vec<Cells>, bool) {
-        let Self {
-            header,
-            number,
-            ticks,
-            columns,
-            own_bounds,
-            effort,
-        } = *self;
-        let (mut coded, mut restored) = (Vec::with_capacity(columns.len()), Vec::with_capacity(columns.len()));
-        for (cells, own) in columns.iter().zip(own_bounds) {
+        let (header, number, ticks, effort) = (self.header, self.number, self.ticks, self.effort);
+        let (mut coded, mut restored) = (Vec::new(), Vec::with_capacity(self.columns.len()));
+        for (cells, own) in self.columns.iter().zip(&self.own_bounds) {
             let mut column = encode_column(header, cells, *own, &restored, effort, may_share);
             restored.push(std::mem::take(&mut column.restored));
             coded.push(column);
@@ -235,7 +204,7 @@ impl Rows<'_> {
         }
         if shares {
             let indices: Vec<Option<Vec<i64>>> = coded.into_iter().map(|column| column.indices).collect();
-            body.extend(shared::encode(header, columns, &specials, &indices, &restored, effort));
+            body.extend(shared::encode(header, &self.columns, &specials, &indices, &restored, effort));
         }
         (body, restored, shares)
     }

@@ -2,7 +2,6 @@
 
 use super::piece::{PIECE_OVERHEAD, Piece};
 use super::{MAX_PIECES, max_rows};
-use crate::block::{self, Cells};
 use crate::error::Error;
 use crate::header::{Form, Header, MAX_START};
 use crate::schema::Schema;
@@ -201,9 +200,7 @@ impl FrameWriter {
         let Some(header) = &self.header else {
             return Err(Error::Broken);
         };
-        let Waiting { ticks, columns, ranges } = &self.rows;
-        let own = ranges.own_bounds(header);
-        let cells: Vec<Cells> = columns.iter().map(|cells| cells[..rows].to_vec()).collect();
-        Ok(block::encode(header, self.frames, &ticks[..rows], &cells, &own, Effort::Thorough).0)
+        let rows = self.rows.first(rows, header, self.frames, Effort::Thorough);
+        Ok(rows.block().0)
     }
 }
