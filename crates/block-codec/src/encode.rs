@@ -1,7 +1,7 @@
 //! Encoding of blocks: the grids and codings that are tried.
 
 use crate::grid::Grid;
-use crate::head::{Coding, SAMPLES, write_head};
+use crate::head::{Coding, SAMPLES};
 use crate::indices::{smallest_pco, write_block};
 use crate::rows::Others;
 use crate::stored::STORED_ROWS;
@@ -71,13 +71,18 @@ impl BlockCodec {
         }
         if best.0.as_ref().is_none_or(|b| b.len() > VERY_FINE * samples.len() / 8) {
             if let Some(numbers) = smallest_pco(samples)? {
-                best.keep([&[SAMPLES | 3 << 4], numbers.as_slice()].concat());
+                best.keep([self.head(None, Coding::Wrapped, false, &[]), numbers].concat());
             }
             let keys = samples.iter().map(|sample| levels::key_of_sample(*sample));
             if let Some(found) = levels::levels(keys, self.effort) {
-                best.keep(levels::write(vec![SAMPLES], true, &found, None)?);
+                best.keep(levels::write(self.head(None, Coding::Levels, false, &[]), true, &found, None)?);
                 if others.is_some() {
-                    best.keep(levels::write(vec![SAMPLES | 64], true, &found, others.as_ref())?);
+                    best.keep(levels::write(
+                        self.head(None, Coding::Levels, true, &[]),
+                        true,
+                        &found,
+                        others.as_ref(),
+                    )?);
                 }
             }
             best.keep(raw(samples));
@@ -94,15 +99,11 @@ impl BlockCodec {
         best: &mut Shortest,
     ) -> Result<(), Error> {
         let (indices, exceptions) = self.indices(grid, samples);
-        let head = |coding, joint| {
-            let mut bytes = Vec::new();
-            write_head(grid, coding, joint, &exceptions, &mut bytes);
-            bytes
-        };
+        let head = |coding, joint| self.head(Some(grid), coding, joint, &exceptions);
         let mut shortest = Shortest::default();
-        shortest.keep(write_block(true, grid, &indices, &exceptions, None)?);
+        shortest.keep(write_block(head(Coding::Models, false), true, grid, &indices, None)?);
         if others.is_some() {
-            shortest.keep(write_block(true, grid, &indices, &exceptions, others)?);
+            shortest.keep(write_block(head(Coding::Models, true), true, grid, &indices, others)?);
         }
         // On coarse grids the models need far fewer bits. Try the general coder only if a sample takes many bits.
         let is_fine = shortest.0.as_ref().is_none_or(|b| b.len() > FINE * samples.len() / 8);
@@ -114,9 +115,7 @@ impl BlockCodec {
             }
         }
         if is_fine && let Some(numbers) = smallest_pco(&indices)? {
-            let mut bytes = head(Coding::Wrapped, false);
-            bytes.extend(numbers);
-            shortest.keep(bytes);
+            shortest.keep([head(Coding::Wrapped, false), numbers].concat());
         }
         shortest.0.into_iter().for_each(|bytes| best.keep(bytes));
         Ok(())

@@ -2,7 +2,7 @@
 
 use crate::encode::raw;
 use crate::grid::Grid;
-use crate::head::{Coding, SAMPLES, STORED, write_head};
+use crate::head::Coding;
 use crate::indices::{LEVEL, to_wrapped_pco, write_block};
 use crate::sections::{LEAST_ROWS, sections};
 use crate::stored::{self, Plan};
@@ -97,13 +97,14 @@ impl BlockCodec {
         });
         if let Some((found, plan)) = found.transpose()?.flatten() {
             return Ok(if self.is_tabled(samples.len()) {
-                levels::write_tabled(vec![SAMPLES | 128, STORED], &found, &plan)?
+                levels::write_tabled(self.head(None, Coding::StoredLevels, false, &[]), &found, &plan)?
             } else {
-                levels::write(vec![SAMPLES], false, &found, None)?
+                levels::write(self.head(None, Coding::Levels, false, &[]), false, &found, None)?
             });
         }
         let numbers = to_wrapped_pco(samples, &DeltaSpec::default(), LEVEL)?;
-        Ok(numbers.map_or_else(|| raw(samples), |numbers| [&[SAMPLES | 3 << 4], numbers.as_slice()].concat()))
+        Ok(numbers
+            .map_or_else(|| raw(samples), |numbers| [self.head(None, Coding::Wrapped, false, &[]), numbers].concat()))
     }
 
     /// The block on a grid; `None` if samples without one are shorter.
@@ -137,12 +138,8 @@ impl BlockCodec {
         if least > VERY_FINE && stored::sample_bits(samples)? < least {
             return Ok(None);
         }
-        let head = |coding| {
-            let mut bytes = Vec::new();
-            write_head(grid, coding, false, exceptions, &mut bytes);
-            bytes
-        };
-        let counted = || write_block(false, grid, indices, exceptions, None);
+        let head = |coding| self.head(Some(grid), coding, false, exceptions);
+        let counted = || write_block(head(Coding::Counts), false, grid, indices, None);
         Ok(Some(match choice {
             Choice::Symbols(plan) if is_tabled => {
                 let bytes = stored::write(indices, &plan, head(Coding::Stored))?;
@@ -155,14 +152,10 @@ impl BlockCodec {
                 levels::write_tabled(head(Coding::StoredLevels), &found, &plan)?
             }
             Choice::Levels(found, _) => levels::write(head(Coding::Levels), false, &found, None)?,
-            Choice::Pco(order) => {
-                let mut bytes = head(Coding::Wrapped);
-                match to_wrapped_pco(indices, &DeltaSpec::TryConsecutive(order), LEVEL)? {
-                    Some(numbers) => bytes.extend(numbers),
-                    None => bytes = counted()?,
-                }
-                bytes
-            }
+            Choice::Pco(order) => match to_wrapped_pco(indices, &DeltaSpec::TryConsecutive(order), LEVEL)? {
+                Some(numbers) => [head(Coding::Wrapped), numbers].concat(),
+                None => counted()?,
+            },
         }))
     }
 }

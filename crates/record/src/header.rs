@@ -6,6 +6,7 @@ use crate::header_column::shortened;
 use crate::schema::{Schema, TimeBase};
 use crate::time::Grid;
 pub(crate) use crate::wire::VERSION_5;
+use crate::wire::written;
 use fewbits_block_codec::Start;
 use std::collections::hash_map::RandomState;
 use std::hash::{BuildHasher, Hasher};
@@ -114,8 +115,10 @@ impl Header {
     pub(crate) fn with_starts(mut self, columns: &[Vec<Option<f64>>]) -> Self {
         let start = |(column, cells): (usize, &Vec<Option<f64>>)| {
             let finite: Vec<f64> = cells.iter().flatten().copied().filter(|x| x.is_finite()).collect();
-            let start = adaptive::start(&finite, &self.target(column, None))?;
-            (start.to_bytes().len() <= MAX_START).then_some(start)
+            let target = self.target(column, None);
+            let start = adaptive::start(&finite, &target)?;
+            let bytes = written(|fields| adaptive::code_start(fields, Some(&start), &target));
+            (bytes.len() <= MAX_START).then_some(start)
         };
         self.starts = columns.iter().enumerate().map(start).collect();
         self.checked()

@@ -1,11 +1,11 @@
 //! One column of a header.
 
 use crate::bound::{Bound, TENS};
-use crate::codec::Target;
+use crate::codec::{Target, adaptive};
 use crate::column::Column;
 use crate::error::{Damage, Error};
 use crate::integers::Integers;
-use crate::wire::Fields;
+use crate::wire::{Fields, short_bound};
 use fewbits_block_codec::Start;
 use std::f64::consts::TAU;
 
@@ -49,7 +49,7 @@ pub(crate) fn shortened(bound: f64) -> f64 {
 fn number<F: Fields>(fields: &mut F, own: f64) -> Result<f64, Damage> {
     let (form, digits) = digits(own).unwrap_or((if own == TAU { TURN } else { DOUBLE }, 0));
     match fields.byte(form)? {
-        DOUBLE => fields.f64(own),
+        DOUBLE => Ok(fields.f64(own)?),
         TURN => Ok(TAU),
         decimals => {
             let ten = TENS.get(usize::from(decimals));
@@ -96,7 +96,7 @@ pub(crate) fn column<F: Fields>(
         1 => Bound::Absolute(number(fields, size)?),
         2 => {
             let share = number(fields, size)?;
-            bound_of_share = fields.short_bound(share_bound)?;
+            bound_of_share = short_bound(fields, share_bound)?;
             Bound::ShareOfRange(share)
         }
         3 => Bound::Decimals(fields.byte(places)?),
@@ -123,6 +123,6 @@ pub(crate) fn column<F: Fields>(
         bound: column.bound_in(bound_of_share),
         period: column.period,
     };
-    let start = (kind & HAS_START != 0).then(|| fields.start(start, &target));
+    let start = (kind & HAS_START != 0).then(|| adaptive::code_start(fields, start, &target));
     Ok((column, bound_of_share, start.transpose()?))
 }

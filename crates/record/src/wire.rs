@@ -1,10 +1,8 @@
-//! Fields of records, records with a length and a checksum. Integers and the byte reader are those of the block codec.
+//! Records with a length and a checksum. Integers, fields and the byte reader are those of the block codec.
 
-use crate::codec::{Target, adaptive};
 use crate::error::Damage;
-use fewbits_block_codec::Start;
 use fewbits_block_codec::bytes::Unread;
-pub(crate) use fewbits_block_codec::bytes::{Bytes, push_varint, unzigzag, zigzag};
+pub(crate) use fewbits_block_codec::bytes::{Bytes, Fields, push_varint, unzigzag, zigzag};
 use std::ops::RangeInclusive;
 
 /// The oldest version of the format that is read.
@@ -68,87 +66,13 @@ pub(crate) fn read_checked(
     Ok((content, end + CHECK_BYTES))
 }
 
-/// Fields of a record, described once for writer and reader: a writer appends the values that it is given, a reader returns those of its
-/// bytes. Only a reader can fail.
-pub(crate) trait Fields {
-    /// Bytes as they are.
-    fn bytes<const N: usize>(&mut self, own: [u8; N]) -> Result<[u8; N], Damage>;
-    fn varint(&mut self, own: u64) -> Result<u64, Damage>;
-    /// A text behind its length.
-    fn text(&mut self, own: &str) -> Result<String, Damage>;
-    /// The start of a column's blocks within this bound.
-    fn start(&mut self, own: Option<&Start>, target: &Target) -> Result<Start, Damage>;
-
-    fn byte(&mut self, own: u8) -> Result<u8, Damage> {
-        Ok(self.bytes([own])?[0])
-    }
-
-    fn signed(&mut self, own: i64) -> Result<i64, Damage> {
-        Ok(unzigzag(self.varint(zigzag(own))?))
-    }
-
-    fn f64(&mut self, own: f64) -> Result<f64, Damage> {
-        Ok(f64::from_le_bytes(self.bytes(own.to_le_bytes())?))
-    }
-
-    /// The first three bytes of a bound, highest first.
-    fn short_bound(&mut self, own: f64) -> Result<f64, Damage> {
-        let [a, b, c, ..] = own.to_be_bytes();
-        let [a, b, c] = self.bytes([a, b, c])?;
-        let bound = f64::from_be_bytes([a, b, c, 0, 0, 0, 0, 0]);
-        let is_bound = bound >= 0.0 && (2.0 * bound).is_finite();
-        is_bound.then_some(bound).ok_or(Damage::Content("bound"))
-    }
-
-    /// An integer that must not exceed `limit`.
-    fn count(&mut self, own: usize, limit: usize, what: &'static str) -> Result<usize, Damage> {
-        let count = usize::try_from(self.varint(own as u64)?).ok();
-        count.filter(|count| *count <= limit).ok_or(Damage::Content(what))
-    }
-}
-
-impl Fields for Vec<u8> {
-    fn bytes<const N: usize>(&mut self, own: [u8; N]) -> Result<[u8; N], Damage> {
-        self.extend(own);
-        Ok(own)
-    }
-
-    fn varint(&mut self, own: u64) -> Result<u64, Damage> {
-        push_varint(self, own);
-        Ok(own)
-    }
-
-    fn text(&mut self, own: &str) -> Result<String, Damage> {
-        push_varint(self, own.len() as u64);
-        self.extend_from_slice(own.as_bytes());
-        Ok(own.to_owned())
-    }
-
-    fn start(&mut self, own: Option<&Start>, _: &Target) -> Result<Start, Damage> {
-        let own = *own.ok_or(Damage::Content("start of blocks"))?;
-        self.extend(own.to_bytes());
-        Ok(own)
-    }
-}
-
-impl Fields for Bytes<'_> {
-    fn bytes<const N: usize>(&mut self, _: [u8; N]) -> Result<[u8; N], Damage> {
-        Ok(self.array()?)
-    }
-
-    fn varint(&mut self, _: u64) -> Result<u64, Damage> {
-        Ok(Bytes::varint(self)?)
-    }
-
-    fn text(&mut self, _: &str) -> Result<String, Damage> {
-        let length = Bytes::count(self, self.0.len(), "length of a text")?;
-        let text = std::str::from_utf8(self.take(length)?);
-        text.map(str::to_owned).map_err(|_| Damage::Content("text"))
-    }
-
-    fn start(&mut self, _: Option<&Start>, target: &Target) -> Result<Start, Damage> {
-        adaptive::read_start(&mut self.0, target)
-    }
+/// The first three bytes of a bound, highest first.
+pub(crate) fn short_bound<F: Fields>(fields: &mut F, own: f64) -> Result<f64, Damage> {
+    let [a, b, c, ..] = own.to_be_bytes();
+    let [a, b, c] = fields.bytes([a, b, c])?;
+    let bound = f64::from_be_bytes([a, b, c, 0, 0, 0, 0, 0]);
+    let is_bound = bound >= 0.0 && (2.0 * bound).is_finite();
+    is_bound.then_some(bound).ok_or(Damage::Content("bound"))
 }
 
 /// What a description writes.

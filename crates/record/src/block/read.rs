@@ -10,7 +10,7 @@ use crate::error::{Damage, Error};
 use crate::header::{Header, VERSION_5};
 use crate::specials::{self, Specials};
 use crate::time::{self, TimeKind};
-use crate::wire::{Bytes, Fields, push_varint};
+use crate::wire::{Bytes, push_varint, short_bound};
 use fewbits_block_codec::arithmetic::Reader;
 
 /// Decodes one block whose checksum was verified. Columns that are not `wanted` stay empty.
@@ -206,7 +206,7 @@ fn read_section<'a>(
         return Ok(Section { id, own, others, bytes });
     }
     let own = if descriptor & BOUND_FOLLOWS != 0 {
-        Some(body.short_bound(0.0)?)
+        Some(short_bound(body, 0.0)?)
     } else {
         None
     };

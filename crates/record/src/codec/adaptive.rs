@@ -4,6 +4,7 @@ use super::relative::Lattice;
 use super::{Context, Target};
 use crate::bound::{Bound, TENS};
 use crate::error::Damage;
+use fewbits_block_codec::bytes::Fields;
 use fewbits_block_codec::{BlockCodec, Effort, Start};
 use std::borrow::Cow;
 
@@ -61,8 +62,9 @@ pub(crate) fn start(samples: &[f64], target: &Target) -> Option<Start> {
     codec(target)?.start(&prepared(samples, target))
 }
 
-pub(crate) fn read_start(bytes: &mut &[u8], target: &Target) -> Result<Start, Damage> {
-    let start = codec(target).and_then(|codec| codec.read_start(bytes).ok());
+/// The start as fields; a reader has none.
+pub(crate) fn code_start<F: Fields>(fields: &mut F, own: Option<&Start>, target: &Target) -> Result<Start, Damage> {
+    let start = codec(target).and_then(|codec| codec.code_start(fields, own).ok());
     start.ok_or(Damage::Content("start of blocks"))
 }
 
