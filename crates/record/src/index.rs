@@ -95,11 +95,12 @@ pub(crate) struct Segment {
 }
 
 impl Segment {
-    pub(crate) fn new(start: u64, length: u64, entries: &[BlockInfo]) -> Self {
+    /// Of these entries, of which there must be some.
+    pub(crate) fn new(length: u64, entries: &[BlockInfo]) -> Self {
         let filled = entries.iter().filter(|entry| entry.rows > 0);
         let sum = |of: fn(&BlockInfo) -> u64| entries.iter().map(of).fold(0, u64::saturating_add);
         Self {
-            start,
+            start: entries.first().map_or(0, |entry| entry.offset),
             blocks: sum(|entry| entry.bytes),
             length,
             rows: sum(|entry| entry.rows),

@@ -221,7 +221,7 @@ pub(crate) fn index_of(reader: &mut (impl Read + Seek), header: &Header) -> Resu
         }
         Ok((index::ONLY, content, whole)) if whole as u64 == length => {
             let entries = read(content, |fields| index::segment(fields, header, first, &[]));
-            (entries.map(|entries| vec![Segment::new(first, length, &entries)]), trailer)
+            (entries.map(|entries| vec![Segment::new(length, &entries)]), trailer)
         }
         _ => return Ok(without),
     };

@@ -33,8 +33,6 @@ pub struct Recorder<W> {
     next_tick: i64,
     /// Number of bytes written.
     offset: u64,
-    /// Offset of the first block of the present segment.
-    segment_start: u64,
     entries: Vec<BlockInfo>,
     segments: Vec<Segment>,
     /// Number of the next block.
@@ -76,12 +74,10 @@ impl Recorder<File> {
             Opened::Other(file, header, single, scanner) => return Self::copied(file, path, &header, single, scanner),
         };
         let schema = resumed.header.schema.clone();
-        let first = resumed.header.length as u64;
         Ok(Self {
             header: Some(resumed.header),
-            next_tick: resumed.next_tick,
+            next_tick: resume::next_tick(&resumed.segments, &resumed.entries),
             offset: resumed.offset,
-            segment_start: resumed.segments.last().map_or(first, Segment::end),
             segments: resumed.segments,
             entries: resumed.entries,
             next_number: resumed.next_number,
@@ -141,7 +137,6 @@ impl<W: Write> Recorder<W> {
             header: None,
             next_tick: 0,
             offset: 0,
-            segment_start: 0,
             entries: Vec::new(),
             segments: Vec::new(),
             next_number: 0,
@@ -306,7 +301,6 @@ impl<W: Write> Recorder<W> {
 
     fn put_header(&mut self, header: Header) -> Result<(), Error> {
         self.write(&header.to_bytes())?;
-        self.segment_start = self.offset;
         self.header = Some(header);
         Ok(())
     }
@@ -355,9 +349,7 @@ impl<W: Write> Recorder<W> {
         let content = written(|fields| index::segment(fields, header, 0, &self.entries));
         let bytes = index::special(header.check, kind, &content);
         self.write(&bytes)?;
-        let segment = Segment::new(self.segment_start, bytes.len() as u64, &self.entries);
-        self.segment_start = segment.end();
-        self.segments.push(segment);
+        self.segments.push(Segment::new(bytes.len() as u64, &self.entries));
         self.entries.clear();
         Ok(())
     }

@@ -18,7 +18,6 @@ pub(crate) struct Resumed {
     pub(crate) offset: u64,
     pub(crate) segments: Vec<Segment>,
     pub(crate) entries: Vec<BlockInfo>,
-    pub(crate) next_tick: i64,
     pub(crate) next_number: u64,
 }
 
@@ -126,7 +125,6 @@ fn from_index(file: &mut File, header: &Header, mut segments: Vec<Segment>) -> R
     Ok(Some(Resumed {
         header: header.clone(),
         offset,
-        next_tick: next_tick(&segments, &entries),
         next_number,
         segments,
         entries,
@@ -151,7 +149,7 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
     let mut scanner = Scanner::default();
     scanner.header(file)?;
     let columns = header.schema.columns.len();
-    let (mut offset, mut segment_start) = (scanner.consumed(), scanner.consumed());
+    let mut offset = scanner.consumed();
     let (mut entries, mut segments): (Vec<BlockInfo>, Vec<Segment>) = (Vec::new(), Vec::new());
     let mut next_number = 0;
     loop {
@@ -177,9 +175,7 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
                 _ => damaged(),
             }),
             Kind::Segment if index_agrees(&header, scanner.bytes(&found), &entries) => {
-                let segment = Segment::new(segment_start, found.length as u64, &entries);
-                segment_start = segment.end();
-                segments.push(segment);
+                segments.push(Segment::new(found.length as u64, &entries));
                 entries.clear();
             }
             // A footer, or a segment some of whose blocks were damaged later: its bytes stay and are skipped.
@@ -187,7 +183,6 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
         }
     }
     Ok(Resumed {
-        next_tick: next_tick(&segments, &entries),
         next_number,
         header,
         offset,
@@ -200,5 +195,5 @@ fn index_agrees(header: &Header, bytes: &[u8], entries: &[BlockInfo]) -> bool {
     let content = index::read_special(header, bytes);
     let read = content.and_then(|(_, content, _)| read(content, |fields| index::segment(fields, header, 0, &[])));
     let sizes = |entries: &[BlockInfo]| -> Vec<_> { entries.iter().map(|entry| (entry.bytes, entry.rows)).collect() };
-    read.is_ok_and(|read| sizes(&read) == sizes(entries))
+    !entries.is_empty() && read.is_ok_and(|read| sizes(&read) == sizes(entries))
 }

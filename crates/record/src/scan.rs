@@ -53,8 +53,6 @@ pub(crate) struct Scanner {
     pending: Option<Found>,
     /// The order of blocks.
     order: Order,
-    /// A block whose missing neighbours were reported first.
-    misses_others: Option<Block>,
     /// Whether the last record found is the end of a recording.
     has_end: bool,
     /// Checksums of the buffer's prefixes, while a record is searched for.
@@ -240,9 +238,6 @@ impl Scanner {
         header: &Header,
         wanted: impl Fn(usize) -> bool,
     ) -> Option<Result<Block, Error>> {
-        if let Some(block) = self.misses_others.take() {
-            return Some(Ok(block));
-        }
         loop {
             let found = match self.next(reader, header) {
                 Ok(found) => found?,
@@ -260,7 +255,8 @@ impl Scanner {
                 return Some(Ok(block));
             };
             if damage == Damage::Missing {
-                self.misses_others = Some(block);
+                // This is reported first, and the block by the next call.
+                self.pending = Some(found);
                 return Some(Err(Error::block(found.offset, 0, damage)));
             }
             return Some(Err(found.damaged(damage)));
@@ -296,15 +292,19 @@ impl Order {
         Self(number.map(|number| number.saturating_add(1)))
     }
 
-    /// Judges the next block: [`Damage::Missing`] if others should stand before it, [`Damage::Misplaced`] if it must not be read.
+    /// Judges the next block: [`Damage::Missing`] once if others should stand before it, [`Damage::Misplaced`] if it must not be read.
     pub(crate) fn judge(&mut self, number: Option<u64>) -> Option<Damage> {
         let number = number?;
         let expected = self.0.unwrap_or(number);
         if number < expected {
             return Some(Damage::Misplaced);
         }
+        if number > expected {
+            self.0 = Some(number);
+            return Some(Damage::Missing);
+        }
         self.0 = Some(number.saturating_add(1));
-        (number > expected).then_some(Damage::Missing)
+        None
     }
 }
 

@@ -103,10 +103,7 @@ pub(super) fn encode(
         };
         // The code goes on from the shorter of two versions. A reader is told which, so the choice may be any.
         let alone = written(&[]);
-        let related = match effort {
-            Effort::Thorough => related::columns(cells[column], &restored[..column]),
-            _ => Vec::new(),
-        };
+        let related = related::columns(cells[column], &restored[..column], effort);
         let joint = (!related.is_empty()).then(|| written(&related));
         writer = joint.filter(|joint| joint.bits() < alone.bits()).unwrap_or(alone);
     }

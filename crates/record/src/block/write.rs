@@ -52,10 +52,7 @@ fn encode_column(
     }
     let has_value: Vec<bool> = specials.iter().map(Option::is_none).collect();
     let samples = aligned(cells, &has_value);
-    let mut others = match effort {
-        Effort::Thorough => related::columns(cells, before),
-        _ => Vec::new(),
-    };
+    let mut others = related::columns(cells, before, effort);
     let values: Vec<Vec<f64>> = others.iter().map(|i| aligned(&before[*i], &has_value)).collect();
     let values: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
     let context = Context {
