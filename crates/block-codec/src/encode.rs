@@ -27,6 +27,21 @@ impl Shortest {
             self.0 = Some(bytes);
         }
     }
+
+    /// Keeps a list of levels, if there is one, behind these heads of blocks that are joint or not.
+    fn keep_levels(
+        &mut self,
+        found: Option<(Vec<u64>, Vec<i64>)>,
+        head: impl Fn(bool) -> Vec<u8>,
+        others: Option<&Others<'_>>,
+    ) -> Result<(), Error> {
+        let Some(found) = found else { return Ok(()) };
+        self.keep(levels::write(head(false), true, &found, None)?);
+        if others.is_some() {
+            self.keep(levels::write(head(true), true, &found, others)?);
+        }
+        Ok(())
+    }
 }
 
 /// The samples as they are.
@@ -57,7 +72,7 @@ impl BlockCodec {
             return Ok(Vec::new());
         }
         if self.effort == Effort::Fast {
-            return self.encode_fast(samples);
+            return self.encode_fast(samples, true);
         }
         let mut best = Shortest::default();
         // Other columns may mislead the models: the shorter of both blocks is kept.
@@ -74,17 +89,8 @@ impl BlockCodec {
                 best.keep([self.head(None, Coding::Wrapped, false, &[]), numbers].concat());
             }
             let keys = samples.iter().map(|sample| levels::key_of_sample(*sample));
-            if let Some(found) = levels::levels(keys, self.effort) {
-                best.keep(levels::write(self.head(None, Coding::Levels, false, &[]), true, &found, None)?);
-                if others.is_some() {
-                    best.keep(levels::write(
-                        self.head(None, Coding::Levels, true, &[]),
-                        true,
-                        &found,
-                        others.as_ref(),
-                    )?);
-                }
-            }
+            let head = |joint| self.head(None, Coding::Levels, joint, &[]);
+            best.keep_levels(levels::levels(keys, self.effort), head, others.as_ref())?;
             best.keep(raw(samples));
         }
         Ok(best.0.unwrap_or_default())
@@ -108,12 +114,7 @@ impl BlockCodec {
         // On coarse grids the models need far fewer bits. Try the general coder only if a sample takes many bits.
         let is_fine = shortest.0.as_ref().is_none_or(|b| b.len() > FINE * samples.len() / 8);
         let keys = indices.iter().map(|index| levels::key_of_index(*index));
-        if let Some(found) = levels::levels(keys, self.effort) {
-            shortest.keep(levels::write(head(Coding::Levels, false), true, &found, None)?);
-            if others.is_some() {
-                shortest.keep(levels::write(head(Coding::Levels, true), true, &found, others)?);
-            }
-        }
+        shortest.keep_levels(levels::levels(keys, self.effort), |joint| head(Coding::Levels, joint), others)?;
         if is_fine && let Some(numbers) = smallest_pco(&indices)? {
             shortest.keep([head(Coding::Wrapped, false), numbers].concat());
         }

@@ -45,17 +45,8 @@ fn few_levels(keys: impl ExactSizeIterator<Item = u64>) -> Option<(Levels, Plan,
 }
 
 impl BlockCodec {
-    /// As [`encode`](Self::encode), of at least one sample.
-    pub(crate) fn encode_fast(&self, samples: &[f64]) -> Result<Vec<u8>, Error> {
-        self.encode_fast_in(samples, true)
-    }
-
-    /// A block without sections.
-    pub(crate) fn encode_section(&self, samples: &[f64]) -> Result<Vec<u8>, Error> {
-        self.encode_fast_in(samples, false)
-    }
-
-    fn encode_fast_in(&self, samples: &[f64], may_have_sections: bool) -> Result<Vec<u8>, Error> {
+    /// As [`encode`](Self::encode), of at least one sample; in sections if it may have some.
+    pub(crate) fn encode_fast(&self, samples: &[f64], may_have_sections: bool) -> Result<Vec<u8>, Error> {
         let grid = self.grids(samples).into_iter().next();
         let coded = grid.map(|grid| (grid, self.indices(&grid, samples)));
         if may_have_sections && samples.len() >= LEAST_ROWS {

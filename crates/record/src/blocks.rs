@@ -109,7 +109,7 @@ impl<R: Read + Seek> Blocks<'_, R> {
         let is_near = |(first, last): (i64, i64)| {
             first.abs_diff(entry.ticks.0) <= tolerance && last.abs_diff(entry.ticks.1) <= tolerance
         };
-        let ends = index::ends(block.ticks.iter().map(|tick| (*tick, *tick)));
+        let ends = index::ends_of(&block.ticks);
         let is_described = block.rows() as u64 == entry.rows && ends.is_some_and(is_near);
         if !is_described || (block.number.is_some() && block.number <= self.last_number) {
             return Err(damaged(Damage::Misplaced));
@@ -140,17 +140,11 @@ impl<R: Read + Seek> Blocks<'_, R> {
         Ok(())
     }
 
-    /// The only block of a recording.
-    fn only(&self) -> Result<Block, Error> {
-        let content = self.playback.single.as_deref().unwrap_or_default();
-        self.playback
-            .only(content, |column| self.playback.chosen.contains(&column))
-    }
-
     /// What comes next. A block that is [`Part::Known`] may be passed over.
     pub(crate) fn part(&mut self) -> Option<Result<Part, Error>> {
         if std::mem::take(&mut self.single) {
-            return Some(self.only().map(Part::Found));
+            let block = self.playback.only(|column| self.playback.chosen.contains(&column))?;
+            return Some(block.map(Part::Found));
         }
         loop {
             if self.scan.is_some() {

@@ -133,11 +133,6 @@ impl Error {
         Self::Block { offset, bytes, damage }
     }
 
-    /// Damage of the header.
-    pub(crate) fn header(damage: impl Into<Damage>) -> Self {
-        Self::Header(damage.into())
-    }
-
     pub(crate) fn io(action: &'static str) -> impl Fn(io::Error) -> Self {
         move |source| Self::Io { action, source }
     }

@@ -69,7 +69,7 @@ impl BlockInfo {
             offset,
             bytes,
             rows: ticks.len() as u64,
-            ticks: ends(ticks.iter().map(|tick| (*tick, *tick))).unwrap_or((0, 0)),
+            ticks: ends_of(ticks).unwrap_or((0, 0)),
             ends: aggregates.iter().map(Aggregate::ends).collect(),
             aggregates: Some(aggregates),
         }
@@ -79,6 +79,11 @@ impl BlockInfo {
 /// The smallest and the largest of pairs of these.
 pub(crate) fn ends(pairs: impl Iterator<Item = (i64, i64)>) -> Option<(i64, i64)> {
     pairs.reduce(|(low, high), (first, last)| (low.min(first), high.max(last)))
+}
+
+/// The smallest and the largest tick.
+pub(crate) fn ends_of(ticks: &[i64]) -> Option<(i64, i64)> {
+    ends(ticks.iter().map(|tick| (*tick, *tick)))
 }
 
 /// Entry of one segment in the footer.

@@ -121,9 +121,8 @@ impl<R: Read + Seek> Playback<R> {
     /// # Errors
     /// If the only block is damaged.
     pub fn ticks(&self) -> Result<Option<(i64, i64)>, Error> {
-        if let Some(content) = &self.single {
-            let block = self.only(content, |_| false)?;
-            return Ok(index::ends(block.ticks.iter().map(|tick| (*tick, *tick))));
+        if let Some(block) = self.only(|_| false) {
+            return Ok(index::ends_of(&block?.ticks));
         }
         let Index::Whole(segments) = &self.index else {
             return Ok(None);
@@ -132,9 +131,10 @@ impl<R: Read + Seek> Playback<R> {
         Ok(index::ends(filled.map(|segment| segment.ticks)))
     }
 
-    /// The only block, with this content.
-    pub(crate) fn only(&self, content: &[u8], wanted: impl Fn(usize) -> bool) -> Result<Block, Error> {
-        block::only(&self.header, content, self.span.1, wanted)
+    /// The only block, if there is one.
+    pub(crate) fn only(&self, wanted: impl Fn(usize) -> bool) -> Option<Result<Block, Error>> {
+        let content = self.single.as_deref()?;
+        Some(block::only(&self.header, content, self.span.1, wanted))
     }
 
     /// Length of the whole recording in bytes.
@@ -160,9 +160,8 @@ impl<R: Read + Seek> Playback<R> {
     /// If reading fails or a part of the index is damaged.
     pub fn index(&mut self) -> Result<Vec<BlockInfo>, Error> {
         let mut infos = Vec::new();
-        if let Some(content) = &self.single {
-            let length = content.len() as u64;
-            let block = self.only(content, |_| true)?;
+        if let Some(block) = self.only(|_| true) {
+            let (block, length) = (block?, self.single.as_ref().map_or(0, Vec::len) as u64);
             // The checksum of the whole recording follows the content.
             let offset = self.span.1.saturating_sub(length + 4);
             infos.push(BlockInfo::of(offset, length, &block.ticks, &block.columns));

@@ -2,7 +2,7 @@
 
 use crate::append::{self, Append};
 use crate::block::{self, Block};
-use crate::error::{Damage, Error};
+use crate::error::Error;
 use crate::header::{Form, Header};
 use crate::index::{self, BLOCKS_PER_SEGMENT, BlockInfo, Segment};
 use crate::resume::{self, Opened};
@@ -103,14 +103,15 @@ impl Recorder<File> {
         copy.put_header(old.clone().with_form(Form::File).renewed())?;
         if let Some(content) = single {
             let block = block::only(old, &content, content.len() as u64, |_| true)?;
-            copy.put_again(old, &content, &block).map_err(Error::header)??;
+            let content = block::renewed(old, &content, 0).map_err(Error::Header)?;
+            copy.put_again(&content, &block)?;
         }
         while let Some(found) = scanner.next(&mut reader, old)? {
             if found.kind == Kind::Block {
                 let block = scanner.decoded(old, &found, |_| true)?;
                 let content = block::content_of(scanner.bytes(&found));
-                let put = content.and_then(|content| copy.put_again(old, content, &block));
-                put.map_err(|damage| found.damaged(damage))??;
+                let content = content.and_then(|content| block::renewed(old, content, copy.next_number));
+                copy.put_again(&content.map_err(|damage| found.damaged(damage))?, &block)?;
             }
         }
         copy.next_tick = resume::next_tick(&copy.segments, &copy.entries);
@@ -305,13 +306,12 @@ impl<W: Write> Recorder<W> {
         Ok(())
     }
 
-    /// Puts a block of another header, of this content, behind the others.
-    fn put_again(&mut self, old: &Header, content: &[u8], block: &Block) -> Result<Result<(), Error>, Damage> {
-        let content = block::renewed(old, content, self.next_number)?;
+    /// Puts a block of this content, which another recording had, behind the others.
+    fn put_again(&mut self, content: &[u8], block: &Block) -> Result<(), Error> {
         let check = self.header.as_ref().map_or(0, |header| header.check);
-        let bytes = checked(check, &[], &content);
+        let bytes = checked(check, &[], content);
         let entry = BlockInfo::of(self.offset, bytes.len() as u64, &block.ticks, &block.columns);
-        Ok(self.put(&bytes, entry))
+        self.put(&bytes, entry)
     }
 
     /// Puts a block behind the others, and a segment of the index if it is full.

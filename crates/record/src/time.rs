@@ -74,6 +74,12 @@ impl Grid {
         i64::try_from(i128::from(self.origin) + i128::from(self.step) * rows).ok()
     }
 
+    /// The ticks of a block that is on the grid.
+    pub(crate) fn ticks(&self, block: u64, rows: usize) -> Result<Vec<i64>, Damage> {
+        let tick = |row| self.tick(block, row).ok_or(Damage::Content("ticks"));
+        (0..rows).map(tick).collect()
+    }
+
     /// The block number, if the ticks are on the grid.
     fn block(&self, ticks: &[i64]) -> Option<u64> {
         let first = i128::from(*ticks.first()?) - i128::from(self.origin);
@@ -181,7 +187,7 @@ pub(crate) fn decode(kind: TimeKind, bytes: &mut Bytes<'_>, rows: usize, grid: &
     match kind {
         TimeKind::Grid => {
             let block = bytes.varint()?;
-            (0..rows).map(|row| grid.tick(block, row).ok_or(beyond)).collect()
+            grid.ticks(block, rows)
         }
         TimeKind::Even => {
             let start = grid.origin.wrapping_add(bytes.signed()?);

@@ -45,6 +45,15 @@ fn read_head(header: &Header, body: &mut Bytes<'_>) -> Result<Head, Damage> {
     })
 }
 
+/// Appends the first numbers of a block, which [`read_head`] reads.
+pub(super) fn push_head(body: &mut Vec<u8>, number: u64, is_usual: bool, flags: u64) {
+    let apart = u64::from(flags & APART != 0);
+    push_varint(body, 4 * number + 2 * apart + u64::from(!is_usual));
+    if !is_usual {
+        push_varint(body, flags & !APART);
+    }
+}
+
 /// The content of a block.
 pub(crate) fn content_of(bytes: &[u8]) -> Result<&[u8], Damage> {
     let mut reader = Bytes(bytes);
@@ -59,13 +68,10 @@ pub(crate) fn renewed(header: &Header, content: &[u8], number: u64) -> Result<Ve
     let rows =
         Some(header.block_rows()).filter(|rows| *rows != header.schema.rows_per_block && flags & ROWS_FOLLOW == 0);
     let mut content = Vec::new();
-    let first = 4 * number + 2 * u64::from(flags & APART != 0);
-    if usual == Some(number) && rows.is_none() {
-        push_varint(&mut content, first);
-    } else {
-        push_varint(&mut content, first + 1);
-        let rows_follow = if rows.is_some() { ROWS_FOLLOW } else { 0 };
-        push_varint(&mut content, flags & !APART | rows_follow);
+    let is_usual = usual == Some(number) && rows.is_none();
+    let rows_follow = if rows.is_some() { ROWS_FOLLOW } else { 0 };
+    push_head(&mut content, number, is_usual, flags | rows_follow);
+    if !is_usual {
         rows.into_iter().for_each(|rows| push_varint(&mut content, rows as u64));
         usual.into_iter().for_each(|on_grid| push_varint(&mut content, on_grid));
     }
@@ -102,9 +108,7 @@ pub(crate) fn decode_content(header: &Header, content: &[u8], wanted: impl Fn(us
         descriptors.fill(CodecId::Adaptive as u8);
     }
     let ticks = if let Some(on_grid) = usual {
-        let mut block = Vec::new();
-        push_varint(&mut block, on_grid);
-        time::decode(TimeKind::Grid, &mut Bytes(&block), rows, &grid)?
+        grid.ticks(on_grid, rows)?
     } else {
         if flags & ROWS_FOLLOW != 0 {
             rows = body.count(rows, "number of rows")?;

@@ -1,9 +1,9 @@
 //! Encoding of a block.
 
-use super::read::decode_content;
+use super::read::{decode_content, push_head};
 use super::{
-    BOUND_FOLLOWS, Cells, DESCRIPTORS_FOLLOW, OTHERS_FOLLOW, ROWS_FOLLOW, SHARED_COLUMNS, SPECIALS_FOLLOW, aligned,
-    plain, shared,
+    APART, BOUND_FOLLOWS, Cells, DESCRIPTORS_FOLLOW, OTHERS_FOLLOW, ROWS_FOLLOW, SHARED_COLUMNS, SPECIALS_FOLLOW,
+    aligned, plain, shared,
 };
 use crate::codec::{self, CodecId, Context};
 use crate::header::Header;
@@ -159,36 +159,32 @@ impl Rows<'_> {
             .map(|column| std::mem::take(&mut column.specials))
             .collect();
         let told = !shares && specials.iter().flatten().any(Option::is_some);
-        match (kind, Bytes(&time).varint()) {
-            (TimeKind::Grid, Ok(block)) if all_plain && whole && !told && block == number => {
-                // The usual block: bit 0 is 0, bit 1 says whether columns are apart, the rest is its number, also on the grid.
-                push_varint(&mut body, 4 * block + 2 * u64::from(apart))
+        let flag = |given: bool, flag: u64| if given { flag } else { 0 };
+        let flags = kind as u64
+            | flag(!whole, ROWS_FOLLOW)
+            | flag(!all_plain, DESCRIPTORS_FOLLOW)
+            | flag(told, SPECIALS_FOLLOW);
+        // Nothing else follows the number of a block that stands there on the grid too.
+        let is_usual = flags == TimeKind::Grid as u64 && Bytes(&time).varint() == Ok(number);
+        push_head(&mut body, number, is_usual, flags | flag(apart, APART));
+        if !is_usual {
+            if !whole {
+                push_varint(&mut body, ticks.len() as u64);
             }
-            _ => {
-                let flag = |given: bool, flag: u64| if given { flag } else { 0 };
-                let flags =
-                    flag(!whole, ROWS_FOLLOW) | flag(!all_plain, DESCRIPTORS_FOLLOW) | flag(told, SPECIALS_FOLLOW);
-                // Two bits of the kind of times, and the flags that say what follows.
-                push_varint(&mut body, 4 * number + 2 * u64::from(apart) + 1);
-                push_varint(&mut body, kind as u64 | flags);
-                if !whole {
-                    push_varint(&mut body, ticks.len() as u64);
-                }
-                body.extend_from_slice(&time);
-                if !all_plain {
-                    body.extend(has_own.chunks(8).map(|eight| {
-                        let bits = eight.iter().enumerate();
-                        bits.fold(0, |byte, (i, own)| byte | u8::from(*own) << i)
-                    }));
-                    let columns = coded.iter().zip(&has_own);
-                    body.extend(columns.filter(|(_, own)| **own).map(|(column, _)| column.descriptor));
-                }
-                if told {
-                    let bytes = specials::encode(&specials, ticks.len());
-                    push_varint(&mut body, bytes.len() as u64);
-                    body.extend(bytes);
-                }
-            }
+            body.extend_from_slice(&time);
+        }
+        if !all_plain {
+            body.extend(has_own.chunks(8).map(|eight| {
+                let bits = eight.iter().enumerate();
+                bits.fold(0, |byte, (i, own)| byte | u8::from(*own) << i)
+            }));
+            let columns = coded.iter().zip(&has_own);
+            body.extend(columns.filter(|(_, own)| **own).map(|(column, _)| column.descriptor));
+        }
+        if told {
+            let bytes = specials::encode(&specials, ticks.len());
+            push_varint(&mut body, bytes.len() as u64);
+            body.extend(bytes);
         }
         let last = coded.len() - 1;
         let alone = coded.iter().enumerate().filter(|(_, column)| column.indices.is_none());
