@@ -105,14 +105,7 @@ impl Column {
             let expected = "an absolute bound, a share of the range or lossless for a column on a circle";
             return Err(ArgumentError::new("bound", format!("{:?}", self.bound), expected).into());
         }
-        let smallest = match self.bound {
-            Bound::Absolute(delta) => delta,
-            Bound::ShareOfRange(share) => share * period,
-            Bound::Lossless | Bound::Decimals(_) | Bound::Relative { .. } => period,
-        };
-        if smallest.is_nan() || period / smallest > MAX_CIRCLE_CELLS {
-            return Err(ArgumentError::new("period", period, "at most 2^40 times the bound").into());
-        }
+        check_circle(self.bound, period)?;
         Ok(Self {
             period: Some(period),
             ..self
@@ -203,6 +196,19 @@ impl Column {
     pub(crate) fn known_range(&self) -> Option<f64> {
         self.period.or(self.range)
     }
+}
+
+/// Refuses a circle of more cells than the codec's indices can count.
+pub(crate) fn check_circle(bound: Bound, period: f64) -> Result<(), ArgumentError> {
+    let smallest = match bound {
+        Bound::Absolute(delta) => delta,
+        Bound::ShareOfRange(share) => share * period,
+        Bound::Lossless | Bound::Decimals(_) | Bound::Relative { .. } => period,
+    };
+    if smallest.is_nan() || period / smallest > MAX_CIRCLE_CELLS {
+        return Err(ArgumentError::new("period", period, "at most 2^40 times the bound"));
+    }
+    Ok(())
 }
 
 /// A text of at most 1024 bytes.

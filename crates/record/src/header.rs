@@ -2,6 +2,7 @@
 
 use crate::bound::Bound;
 use crate::codec::{Target, adaptive};
+use crate::column::check_circle;
 use crate::header_column::shortened;
 use crate::schema::{Schema, TimeBase};
 use crate::time::Grid;
@@ -81,8 +82,12 @@ impl Header {
     /// The header of a recording whose first rows are known.
     pub(crate) fn new(mut schema: Schema, ticks: &[i64], share_bounds: Vec<f64>) -> Self {
         for column in &mut schema.columns {
-            if let Bound::Absolute(delta) = &mut column.bound {
-                *delta = shortened(*delta);
+            if let Bound::Absolute(delta) = column.bound {
+                let bound = Bound::Absolute(shortened(delta));
+                // A circle may have too many cells of the shorter one.
+                if column.period.is_none_or(|period| check_circle(bound, period).is_ok()) {
+                    column.bound = bound;
+                }
             }
         }
         let grid = match schema.time {
