@@ -4,6 +4,7 @@
 
 use fewbits_adaptive::{Config, Receiver, Silence, StreamReader};
 use fewbits_block_codec::BlockCodec;
+use fewbits_block_codec::bytes::Bytes;
 
 /// Slots that are read at most: a word may stand for many silent ones.
 const MAX_SLOTS: usize = 2000;
@@ -23,9 +24,9 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
         if let Ok(samples) = codec.decode(block, rows) {
             assert_eq!(samples.len(), rows);
         }
-        let mut behind = block;
-        if let Ok(start) = codec.read_start(&mut behind)
-            && let Ok(samples) = codec.decode_from(&start, behind, rows, &[])
+        let mut fields = Bytes(block);
+        if let Ok(start) = codec.code_start(&mut fields, None)
+            && let Ok(samples) = codec.decode_from(&start, fields.0, rows, &[])
         {
             assert_eq!(samples.len(), rows);
         }

@@ -70,7 +70,11 @@ fn whole(recording: &Recording, codec: BlockCodec, delta: f64, rounds: usize) ->
 fn blocks(recording: &Recording, codec: BlockCodec, rows: usize, with_start: bool) -> Result<usize, Failure> {
     let first = &recording.samples[..rows.min(recording.samples.len())];
     let start = with_start.then(|| codec.start(first)).flatten();
-    let mut size = start.map_or(0, |start| start.to_bytes().len());
+    let mut taught = Vec::new();
+    if let Some(start) = &start {
+        codec.code_start(&mut taught, Some(start))?;
+    }
+    let mut size = taught.len();
     for samples in recording.samples.chunks(rows) {
         size += 4 + match &start {
             Some(start) => codec.encode_from(start, samples, &[])?.bytes.len(),

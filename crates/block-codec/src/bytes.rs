@@ -125,6 +125,95 @@ impl<'a> Bytes<'a> {
     }
 }
 
+/// Fields of a record, described once for writer and reader: a writer (bytes that grow) appends the values that it is given, a reader
+/// ([`Bytes`]) returns those that it finds. Only a reader can fail.
+pub trait Fields {
+    /// Bytes as they are.
+    ///
+    /// # Errors
+    /// If there are fewer.
+    fn bytes<const N: usize>(&mut self, own: [u8; N]) -> Result<[u8; N], Unread>;
+
+    /// An integer of [`push_varint`].
+    ///
+    /// # Errors
+    /// If there is none.
+    fn varint(&mut self, own: u64) -> Result<u64, Unread>;
+
+    /// A text behind its length.
+    ///
+    /// # Errors
+    /// If there is none.
+    fn text(&mut self, own: &str) -> Result<String, Unread>;
+
+    /// A byte.
+    ///
+    /// # Errors
+    /// If there is none.
+    fn byte(&mut self, own: u8) -> Result<u8, Unread> {
+        Ok(self.bytes([own])?[0])
+    }
+
+    /// An integer of [`push_varint`] after [`zigzag`].
+    ///
+    /// # Errors
+    /// If there is none.
+    fn signed(&mut self, own: i64) -> Result<i64, Unread> {
+        Ok(unzigzag(self.varint(zigzag(own))?))
+    }
+
+    /// A little-endian double.
+    ///
+    /// # Errors
+    /// If there is none.
+    fn f64(&mut self, own: f64) -> Result<f64, Unread> {
+        Ok(f64::from_le_bytes(self.bytes(own.to_le_bytes())?))
+    }
+
+    /// An integer that must not exceed `limit`; `what` names it in the error.
+    ///
+    /// # Errors
+    /// If there is none, or it is larger.
+    fn count(&mut self, own: usize, limit: usize, what: &'static str) -> Result<usize, Unread> {
+        let count = usize::try_from(self.varint(own as u64)?).ok();
+        count.filter(|count| *count <= limit).ok_or(Unread::Content(what))
+    }
+}
+
+impl Fields for Vec<u8> {
+    fn bytes<const N: usize>(&mut self, own: [u8; N]) -> Result<[u8; N], Unread> {
+        self.extend(own);
+        Ok(own)
+    }
+
+    fn varint(&mut self, own: u64) -> Result<u64, Unread> {
+        push_varint(self, own);
+        Ok(own)
+    }
+
+    fn text(&mut self, own: &str) -> Result<String, Unread> {
+        push_varint(self, own.len() as u64);
+        self.extend_from_slice(own.as_bytes());
+        Ok(own.to_owned())
+    }
+}
+
+impl Fields for Bytes<'_> {
+    fn bytes<const N: usize>(&mut self, _: [u8; N]) -> Result<[u8; N], Unread> {
+        self.array()
+    }
+
+    fn varint(&mut self, _: u64) -> Result<u64, Unread> {
+        Bytes::varint(self)
+    }
+
+    fn text(&mut self, _: &str) -> Result<String, Unread> {
+        let length = Bytes::count(self, self.0.len(), "length of a text")?;
+        let text = std::str::from_utf8(self.take(length)?);
+        text.map(str::to_owned).map_err(|_| Unread::Content("text"))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]

@@ -1,7 +1,7 @@
 //! Encoding of blocks: the grids and codings that are tried.
 
 use crate::grid::Grid;
-use crate::head::{Coding, SAMPLES, write_head};
+use crate::head::{Coding, SAMPLES};
 use crate::indices::{smallest_pco, write_block};
 use crate::rows::Others;
 use crate::stored::STORED_ROWS;
@@ -26,6 +26,21 @@ impl Shortest {
         if self.0.as_ref().is_none_or(|best| bytes.len() < best.len()) {
             self.0 = Some(bytes);
         }
+    }
+
+    /// Keeps a list of levels, if there is one, behind these heads of blocks that are joint or not.
+    fn keep_levels(
+        &mut self,
+        found: Option<(Vec<u64>, Vec<i64>)>,
+        head: impl Fn(bool) -> Vec<u8>,
+        others: Option<&Others<'_>>,
+    ) -> Result<(), Error> {
+        let Some(found) = found else { return Ok(()) };
+        self.keep(levels::write(head(false), true, &found, None)?);
+        if others.is_some() {
+            self.keep(levels::write(head(true), true, &found, others)?);
+        }
+        Ok(())
     }
 }
 
@@ -57,7 +72,7 @@ impl BlockCodec {
             return Ok(Vec::new());
         }
         if self.effort == Effort::Fast {
-            return self.encode_fast(samples);
+            return self.encode_fast(samples, true);
         }
         let mut best = Shortest::default();
         // Other columns may mislead the models: the shorter of both blocks is kept.
@@ -71,15 +86,11 @@ impl BlockCodec {
         }
         if best.0.as_ref().is_none_or(|b| b.len() > VERY_FINE * samples.len() / 8) {
             if let Some(numbers) = smallest_pco(samples)? {
-                best.keep([&[SAMPLES | 3 << 4], numbers.as_slice()].concat());
+                best.keep([self.head(None, Coding::Wrapped, false, &[]), numbers].concat());
             }
             let keys = samples.iter().map(|sample| levels::key_of_sample(*sample));
-            if let Some(found) = levels::levels(keys, self.effort) {
-                best.keep(levels::write(vec![SAMPLES], true, &found, None)?);
-                if others.is_some() {
-                    best.keep(levels::write(vec![SAMPLES | 64], true, &found, others.as_ref())?);
-                }
-            }
+            let head = |joint| self.head(None, Coding::Levels, joint, &[]);
+            best.keep_levels(levels::levels(keys, self.effort), head, others.as_ref())?;
             best.keep(raw(samples));
         }
         Ok(best.0.unwrap_or_default())
@@ -94,29 +105,18 @@ impl BlockCodec {
         best: &mut Shortest,
     ) -> Result<(), Error> {
         let (indices, exceptions) = self.indices(grid, samples);
-        let head = |coding, joint| {
-            let mut bytes = Vec::new();
-            write_head(grid, coding, joint, &exceptions, &mut bytes);
-            bytes
-        };
+        let head = |coding, joint| self.head(Some(grid), coding, joint, &exceptions);
         let mut shortest = Shortest::default();
-        shortest.keep(write_block(true, grid, &indices, &exceptions, None)?);
+        shortest.keep(write_block(head(Coding::Models, false), true, grid, &indices, None)?);
         if others.is_some() {
-            shortest.keep(write_block(true, grid, &indices, &exceptions, others)?);
+            shortest.keep(write_block(head(Coding::Models, true), true, grid, &indices, others)?);
         }
         // On coarse grids the models need far fewer bits. Try the general coder only if a sample takes many bits.
         let is_fine = shortest.0.as_ref().is_none_or(|b| b.len() > FINE * samples.len() / 8);
         let keys = indices.iter().map(|index| levels::key_of_index(*index));
-        if let Some(found) = levels::levels(keys, self.effort) {
-            shortest.keep(levels::write(head(Coding::Levels, false), true, &found, None)?);
-            if others.is_some() {
-                shortest.keep(levels::write(head(Coding::Levels, true), true, &found, others)?);
-            }
-        }
+        shortest.keep_levels(levels::levels(keys, self.effort), |joint| head(Coding::Levels, joint), others)?;
         if is_fine && let Some(numbers) = smallest_pco(&indices)? {
-            let mut bytes = head(Coding::Wrapped, false);
-            bytes.extend(numbers);
-            shortest.keep(bytes);
+            shortest.keep([head(Coding::Wrapped, false), numbers].concat());
         }
         shortest.0.into_iter().for_each(|bytes| best.keep(bytes));
         Ok(())

@@ -2,7 +2,7 @@
 
 use crate::encode::raw;
 use crate::grid::Grid;
-use crate::head::{Coding, SAMPLES, STORED, write_head};
+use crate::head::Coding;
 use crate::indices::{LEVEL, to_wrapped_pco, write_block};
 use crate::sections::{LEAST_ROWS, sections};
 use crate::stored::{self, Plan};
@@ -45,17 +45,8 @@ fn few_levels(keys: impl ExactSizeIterator<Item = u64> + Clone) -> Option<(Level
 }
 
 impl BlockCodec {
-    /// As [`encode`](Self::encode), of at least one sample.
-    pub(crate) fn encode_fast(&self, samples: &[f64]) -> Result<Vec<u8>, Error> {
-        self.encode_fast_in(samples, true)
-    }
-
-    /// A block without sections.
-    pub(crate) fn encode_section(&self, samples: &[f64]) -> Result<Vec<u8>, Error> {
-        self.encode_fast_in(samples, false)
-    }
-
-    fn encode_fast_in(&self, samples: &[f64], may_have_sections: bool) -> Result<Vec<u8>, Error> {
+    /// As [`encode`](Self::encode), of at least one sample; in sections if it may have some.
+    pub(crate) fn encode_fast(&self, samples: &[f64], may_have_sections: bool) -> Result<Vec<u8>, Error> {
         let grid = self.grids(samples).into_iter().next();
         let coded = grid.map(|grid| (grid, self.indices(&grid, samples)));
         if may_have_sections && samples.len() >= LEAST_ROWS {
@@ -97,13 +88,14 @@ impl BlockCodec {
         });
         if let Some((found, plan)) = found.transpose()?.flatten() {
             return Ok(if self.is_tabled(samples.len()) {
-                levels::write_tabled(vec![SAMPLES | 128, STORED], &found, &plan)?
+                levels::write_tabled(self.head(None, Coding::StoredLevels, false, &[]), &found, &plan)?
             } else {
-                levels::write(vec![SAMPLES], false, &found, None)?
+                levels::write(self.head(None, Coding::Levels, false, &[]), false, &found, None)?
             });
         }
         let numbers = to_wrapped_pco(samples, &DeltaSpec::default(), LEVEL)?;
-        Ok(numbers.map_or_else(|| raw(samples), |numbers| [&[SAMPLES | 3 << 4], numbers.as_slice()].concat()))
+        Ok(numbers
+            .map_or_else(|| raw(samples), |numbers| [self.head(None, Coding::Wrapped, false, &[]), numbers].concat()))
     }
 
     /// The block on a grid; `None` if samples without one are shorter.
@@ -137,12 +129,8 @@ impl BlockCodec {
         if least > VERY_FINE && stored::sample_bits(samples)? < least {
             return Ok(None);
         }
-        let head = |coding| {
-            let mut bytes = Vec::new();
-            write_head(grid, coding, false, exceptions, &mut bytes);
-            bytes
-        };
-        let counted = || write_block(false, grid, indices, exceptions, None);
+        let head = |coding| self.head(Some(grid), coding, false, exceptions);
+        let counted = || write_block(head(Coding::Counts), false, grid, indices, None);
         Ok(Some(match choice {
             Choice::Symbols(plan) if is_tabled => {
                 let bytes = stored::write(indices, &plan, head(Coding::Stored))?;
@@ -155,14 +143,10 @@ impl BlockCodec {
                 levels::write_tabled(head(Coding::StoredLevels), &found, &plan)?
             }
             Choice::Levels(found, _) => levels::write(head(Coding::Levels), false, &found, None)?,
-            Choice::Pco(order) => {
-                let mut bytes = head(Coding::Wrapped);
-                match to_wrapped_pco(indices, &DeltaSpec::TryConsecutive(order), LEVEL)? {
-                    Some(numbers) => bytes.extend(numbers),
-                    None => bytes = counted()?,
-                }
-                bytes
-            }
+            Choice::Pco(order) => match to_wrapped_pco(indices, &DeltaSpec::TryConsecutive(order), LEVEL)? {
+                Some(numbers) => [head(Coding::Wrapped), numbers].concat(),
+                None => counted()?,
+            },
         }))
     }
 }

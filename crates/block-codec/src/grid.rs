@@ -1,7 +1,6 @@
 //! The grid of a block's reconstructions: conversion between samples and integers.
 
 use crate::Effort;
-use crate::bytes::{push_varint, zigzag};
 use crate::vectors::{double, rounded, vectorised};
 use fewbits_node::adaptive::TENS;
 
@@ -380,20 +379,5 @@ impl Grid {
         }
         // The field of the first index has no room for the other end.
         .filter(|index| (-crate::rows::LARGEST..crate::rows::LARGEST).contains(index))
-    }
-
-    /// Writes what the reader needs besides the configuration.
-    pub(crate) fn write(&self, bytes: &mut Vec<u8>) {
-        match self {
-            Self::Stepped { unit, origin, .. } => {
-                push_varint(bytes, *unit as u64);
-                push_varint(bytes, zigzag(*origin));
-            }
-            Self::Line { anchor, .. } if *anchor != 0.0 => bytes.extend_from_slice(&anchor.to_le_bytes()),
-            _ => {}
-        }
-        if self.phase() != 0 {
-            bytes.push(self.phase());
-        }
     }
 }

@@ -1,17 +1,24 @@
 //! The head of a block, before the indices.
 
-use crate::bytes::push_varint;
-use crate::grid::Grid;
+use crate::BlockCodec;
+use crate::bytes::{Bytes, Fields};
+use crate::error::Damaged;
+use crate::grid::{DECIMALS, Grid, PHASES};
+use std::borrow::Cow;
 
 /// Code of the line in the head; smaller codes are numbers of decimals.
 pub(crate) const LINE: u8 = 13;
 pub(crate) const CIRCLE: u8 = 14;
 pub(crate) const SAMPLES: u8 = 15;
 
-/// Flags of the second byte: decimals are rounded to single precision; pco is in its wrapped form; tables that learn follow the counts, or the list
-/// of levels; stored tables are in place of the counts, or follow the list of levels.
+/// Flags of the second byte: exceptions; steps; an anchor; a phase; decimals are rounded to single precision; pco is in its wrapped form; tables
+/// that learn follow the counts, or the list of levels; stored tables are in place of the counts, or follow the list of levels.
+const EXCEPTIONS: u8 = 1;
+pub(crate) const STEPS: u8 = 2;
+const ANCHOR: u8 = 4;
+pub(crate) const PHASE: u8 = 8;
 pub(crate) const SINGLE: u8 = 16;
-pub(crate) const WRAPPED: u8 = 32;
+const WRAPPED: u8 = 32;
 pub(crate) const TABLED: u8 = 64;
 pub(crate) const STORED: u8 = 128;
 
@@ -37,7 +44,7 @@ pub(crate) enum Coding {
 }
 
 /// Of each coding of indices its bits in the first byte, and its flag in the second one.
-pub(crate) const CODINGS: [(Coding, u8, u8); 9] = [
+const CODINGS: &[(Coding, u8, u8)] = &[
     (Coding::Models, 0, 0),
     (Coding::Pco, 1, 0),
     (Coding::Wrapped, 1, WRAPPED),
@@ -50,7 +57,7 @@ pub(crate) const CODINGS: [(Coding, u8, u8); 9] = [
 ];
 
 /// The same of samples.
-pub(crate) const CODINGS_OF_SAMPLES: [(Coding, u8, u8); 6] = [
+const CODINGS_OF_SAMPLES: &[(Coding, u8, u8)] = &[
     (Coding::Levels, 0, 0),
     (Coding::TabledLevels, 0, TABLED),
     (Coding::StoredLevels, 0, STORED),
@@ -59,39 +66,167 @@ pub(crate) const CODINGS_OF_SAMPLES: [(Coding, u8, u8); 6] = [
     (Coding::Wrapped, 3, 0),
 ];
 
-/// The head as it was read.
-pub(crate) struct Head {
+/// The head of a block.
+pub(crate) struct Head<'a> {
     pub(crate) grid: Option<Grid>,
     pub(crate) coding: Coding,
     pub(crate) joint: bool,
-    pub(crate) exceptions: Vec<(usize, f64)>,
+    pub(crate) exceptions: Cow<'a, [(usize, f64)]>,
 }
 
-pub(crate) fn write_head(grid: &Grid, coding: Coding, joint: bool, exceptions: &[(usize, f64)], bytes: &mut Vec<u8>) {
-    let (kind, own) = match grid {
-        Grid::Decimal { decimals, .. } => (*decimals, 0),
-        Grid::Stepped {
-            decimals, is_single, ..
-        } => (*decimals, 2 | if *is_single { SINGLE } else { 0 }),
-        Grid::Line { anchor, .. } => (LINE, if *anchor == 0.0 { 0 } else { 4 }),
-        Grid::Circle { .. } => (CIRCLE, 0),
-    };
-    let written = CODINGS.iter().find(|(own, ..)| *own == coding);
-    let (coding, form) = written.map_or((0, 0), |(_, bits, form)| (*bits, *form));
-    let moved = if grid.phase() == 0 { 0 } else { 8 };
-    let second = own | moved | form | u8::from(!exceptions.is_empty());
-    bytes.push(kind | coding << 4 | u8::from(joint) << 6 | u8::from(second != 0) << 7);
-    if second != 0 {
-        bytes.push(second);
+impl Grid {
+    /// Its number of decimals, or its code in the head, and its flags of the second byte.
+    pub(crate) fn form(&self) -> (u8, u8) {
+        let (kind, flags) = match self {
+            Self::Decimal { decimals, .. } => (*decimals, 0),
+            Self::Stepped {
+                decimals, is_single, ..
+            } => (*decimals, STEPS | if *is_single { SINGLE } else { 0 }),
+            Self::Line { anchor, .. } => (LINE, if *anchor == 0.0 { 0 } else { ANCHOR }),
+            Self::Circle { .. } => (CIRCLE, 0),
+        };
+        (kind, flags | if self.phase() == 0 { 0 } else { PHASE })
     }
-    grid.write(bytes);
-    if !exceptions.is_empty() {
-        push_varint(bytes, exceptions.len() as u64);
-        let mut next = 0;
-        for (row, sample) in exceptions {
-            push_varint(bytes, (row - next) as u64);
-            bytes.extend_from_slice(&sample.to_le_bytes());
-            next = row + 1;
+}
+
+impl BlockCodec {
+    /// What is stored of a grid of this form; a reader has none.
+    pub(crate) fn code_grid<F: Fields>(
+        &self,
+        fields: &mut F,
+        own: Option<&Grid>,
+        (kind, flags): (u8, u8),
+    ) -> Result<Grid, Damaged> {
+        let form = flags & (STEPS | SINGLE);
+        if form != 0 && (kind >= DECIMALS || form == SINGLE) {
+            return Err(Damaged::new("grid", kind, "decimals with steps"));
         }
+        let grid = match (kind, self.period) {
+            (0..DECIMALS, _) if form != 0 => {
+                let (unit, origin) = match own {
+                    Some(Grid::Stepped { unit, origin, .. }) => (*unit, *origin),
+                    _ => (0, 0),
+                };
+                let unit = i64::try_from(fields.varint(unit as u64)?).ok().filter(|unit| *unit > 0);
+                Grid::Stepped {
+                    decimals: kind,
+                    unit: unit.ok_or_else(|| Damaged::new("unit", "too large", "1 to 2^63"))?,
+                    origin: fields.signed(origin)?,
+                    is_single: flags & SINGLE != 0,
+                }
+            }
+            (0..DECIMALS, _) => {
+                let width = Grid::width(self.delta, fewbits_node::adaptive::TENS[usize::from(kind)]);
+                Grid::Decimal {
+                    decimals: kind,
+                    width: width.ok_or_else(|| Damaged::new("decimals", kind, "a grid not finer than the samples"))?,
+                    phase: 0,
+                }
+            }
+            (LINE, _) if !self.is_lossless() => {
+                let mut anchor = match own {
+                    Some(Grid::Line { anchor, .. }) => *anchor,
+                    _ => 0.0,
+                };
+                if flags & ANCHOR != 0 {
+                    anchor = fields.f64(anchor)?;
+                }
+                if !anchor.is_finite() {
+                    return Err(Damaged::new("anchor", anchor, "a finite number"));
+                }
+                Grid::line(self.delta, anchor)
+            }
+            (CIRCLE, Some(period)) => Grid::circle(self.delta, period),
+            _ => return Err(Damaged::new("grid", kind, "one of the agreed accuracy")),
+        };
+        if flags & PHASE == 0 {
+            return Ok(grid);
+        }
+        let phase = fields.byte(own.map_or(0, Grid::phase))?;
+        match grid {
+            Grid::Decimal { .. } | Grid::Line { .. } if (1..PHASES).contains(&phase) => Ok(grid.with_phase(phase)),
+            _ => Err(Damaged::new("phase", phase, "1 to 15, of a grid of cells on a line")),
+        }
+    }
+
+    /// The head of a block of so many rows; a reader may be given any other one.
+    fn code_head<F: Fields>(&self, fields: &mut F, own: &Head<'_>, rows: usize) -> Result<Head<'static>, Damaged> {
+        let (kind, flags) = own.grid.as_ref().map_or((SAMPLES, 0), Grid::form);
+        let codings = |kind| if kind == SAMPLES { CODINGS_OF_SAMPLES } else { CODINGS };
+        let written = codings(kind).iter().find(|(coding, ..)| *coding == own.coding);
+        let (bits, form) = written.map_or((0, 0), |(_, bits, form)| (*bits, *form));
+        let second = flags | form | u8::from(!own.exceptions.is_empty());
+        let head = fields.byte(kind | bits << 4 | u8::from(own.joint) << 6 | u8::from(second != 0) << 7)?;
+        let second = if head & 128 == 0 { 0 } else { fields.byte(second)? };
+        let (kind, joint, form) = (head & 15, head & 64 != 0, second & (WRAPPED | TABLED | STORED));
+        let found = codings(kind)
+            .iter()
+            .find(|(_, bits, own)| (head >> 4 & 3, form) == (*bits, *own));
+        let Some((coding, ..)) = found.copied() else {
+            return Err(Damaged::new("head", format!("{head}, {second}"), "a grid and a coding that belong together"));
+        };
+        if (head & 128 != 0 && second == 0)
+            || (kind == SAMPLES && (second != form || (joint && coding != Coding::Levels)))
+            || (joint && form & (TABLED | STORED) != 0)
+        {
+            return Err(Damaged::new(
+                "second byte",
+                second,
+                "exceptions, steps, an anchor or a phase, and a grid or coding that has them",
+            ));
+        }
+        let grid = match kind {
+            SAMPLES => None,
+            kind => Some(self.code_grid(fields, own.grid.as_ref(), (kind, second))?),
+        };
+        let mut exceptions = Vec::new();
+        if second & EXCEPTIONS != 0 {
+            let (count, mut next) = (fields.varint(own.exceptions.len() as u64)?, 0);
+            for i in 0..count as usize {
+                let (row, sample) = own.exceptions.get(i).copied().unwrap_or((next, 0.0));
+                let row = fields.count(row - next, usize::MAX, "exception")?.saturating_add(next);
+                if row >= rows {
+                    return Err(Damaged::new("exception", row, "a row of the block"));
+                }
+                exceptions.push((row, fields.f64(sample)?));
+                next = row + 1;
+            }
+        }
+        Ok(Head {
+            grid,
+            coding,
+            joint,
+            exceptions: exceptions.into(),
+        })
+    }
+
+    /// The first bytes of a block of this coding, on a grid if the samples have one.
+    pub(crate) fn head(
+        &self,
+        grid: Option<&Grid>,
+        coding: Coding,
+        joint: bool,
+        exceptions: &[(usize, f64)],
+    ) -> Vec<u8> {
+        let head = Head {
+            grid: grid.copied(),
+            coding,
+            joint,
+            exceptions: exceptions.into(),
+        };
+        let mut bytes = Vec::new();
+        // Only a reader can fail here.
+        let _ = self.code_head(&mut bytes, &head, usize::MAX);
+        bytes
+    }
+
+    pub(crate) fn read_head(&self, bytes: &mut Bytes<'_>, rows: usize) -> Result<Head<'static>, Damaged> {
+        let any = Head {
+            grid: None,
+            coding: Coding::Raw,
+            joint: false,
+            exceptions: Cow::default(),
+        };
+        self.code_head(bytes, &any, rows)
     }
 }

@@ -5,7 +5,6 @@ use crate::bytes::{unzigzag, zigzag};
 use crate::counts::Counts;
 use crate::error::Damaged;
 use crate::grid::Grid;
-use crate::head::{Coding, write_head};
 use crate::model::Model;
 use crate::rows::{LARGEST, Others, code_all};
 use pco::data_types::Number;
@@ -83,17 +82,15 @@ pub(crate) fn code_rest<C: Coder>(
     code_all(coder, Counts::new(first, second), wanted, rows, None)
 }
 
-/// A block whose indices are coded by models or by counts.
+/// Appends the code of these indices by models or by counts to the head of a block.
 pub(crate) fn write_block(
+    mut bytes: Vec<u8>,
     by_models: bool,
     grid: &Grid,
     indices: &[i64],
-    exceptions: &[(usize, f64)],
     others: Option<&Others<'_>>,
 ) -> Result<Vec<u8>, Damaged> {
-    let mut bytes = Vec::with_capacity(64 + indices.len() / 2);
-    let coding = if by_models { Coding::Models } else { Coding::Counts };
-    write_head(grid, coding, others.is_some(), exceptions, &mut bytes);
+    bytes.reserve(64 + indices.len() / 2);
     let mut writer = Writer::new(bytes);
     let rests = by_models && indices.len() >= RESTS_ROWS;
     let (first, rests) = code_first(&mut writer, Some(indices.first().copied().unwrap_or(0)), rests)?;

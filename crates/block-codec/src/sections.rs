@@ -113,7 +113,7 @@ impl BlockCodec {
         push_varint(&mut bytes, sections.len() as u64 - 1);
         for (place, rows) in sections.iter().enumerate() {
             let (section, others) = samples.split_at(*rows);
-            let block = self.encode_section(section)?;
+            let block = self.encode_fast(section, false)?;
             if place + 1 < sections.len() {
                 push_varint(&mut bytes, *rows as u64);
                 push_varint(&mut bytes, block.len() as u64);

@@ -13,11 +13,11 @@
 //! blocks), phase (byte, as in blocks), usual index (zigzag varint), `k` (byte).
 
 use crate::arithmetic::{Coder, Reader, Writer};
-use crate::bytes::{Bytes, push_varint, unzigzag, zigzag};
+use crate::bytes::{Fields, unzigzag, zigzag};
 use crate::counts::gamma;
 use crate::error::Damaged;
-use crate::grid::{DECIMALS, Grid};
-use crate::head::{CIRCLE, LINE};
+use crate::grid::Grid;
+use crate::head::{PHASE, SINGLE, STEPS};
 use crate::indices::{RESTS_ROWS, Rest, code_rest};
 use crate::rows::{LARGEST, Others};
 use crate::{BlockCodec, Effort, Error, check_rows};
@@ -31,12 +31,6 @@ const ALONE: u8 = 255;
 const COARSE_BITS: usize = 1;
 const COARSE_BITS_OF_FEW: usize = 2;
 const FEW_ROWS: usize = 1024;
-/// Flag beside the grid: steps follow.
-const STEPPED: u8 = 16;
-/// Flag beside the grid: a phase follows.
-const MOVED: u8 = 32;
-/// Flag beside the grid, together with steps: the samples are rounded to single precision.
-const SINGLE: u8 = 64;
 /// Flag beside the grid: contexts of models have the lengths of rests.
 const RESTS: u8 = 128;
 /// Indices are smaller than `2^47` in zigzag form.
@@ -63,28 +57,6 @@ pub struct StartedBlock {
 }
 
 impl Start {
-    /// The bytes that [`BlockCodec::read_start`] reads.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        let moved = if self.grid.phase() == 0 { 0 } else { MOVED };
-        let rests = if self.rests { RESTS } else { 0 };
-        let mut bytes = vec![
-            moved
-                | rests
-                | match self.grid {
-                    Grid::Decimal { decimals, .. } => decimals,
-                    Grid::Stepped {
-                        decimals, is_single, ..
-                    } => decimals | STEPPED | if is_single { SINGLE } else { 0 },
-                    Grid::Line { .. } => LINE,
-                    Grid::Circle { .. } => CIRCLE,
-                },
-        ];
-        self.grid.write(&mut bytes);
-        push_varint(&mut bytes, zigzag(self.usual));
-        bytes.push(self.k);
-        bytes
-    }
-
     /// The samples at these points of the grid.
     pub fn values(&self, indices: &[i64]) -> Vec<f64> {
         self.grid.values(indices)
@@ -141,34 +113,22 @@ impl BlockCodec {
         })
     }
 
-    /// Reads the bytes of [`Start::to_bytes`], made by a codec of the same accuracy, from the front of `bytes`.
+    /// The fields of a start of a codec of the same accuracy; a reader has none.
     ///
     /// # Errors
-    /// If the bytes are not a start.
-    pub fn read_start(&self, bytes: &mut &[u8]) -> Result<Start, Error> {
-        let mut reader = Bytes(bytes);
-        let [head] = reader.array()?;
-        let kind = head & !(MOVED | SINGLE | RESTS);
-        let is_single = head & SINGLE != 0;
-        let (decimals, stepped) = (kind & !STEPPED, kind & STEPPED != 0);
-        let mut grid = match kind {
-            _ if decimals < DECIMALS && (stepped || !is_single) => {
-                self.decimal_grid(decimals, stepped, is_single, &mut reader)?
-            }
-            _ if is_single => return Err(Damaged::new("grid", kind, "decimals with steps").into()),
-            LINE if !self.is_lossless() => Grid::line(self.delta, 0.0),
-            CIRCLE => self.circle()?,
-            _ => return Err(Damaged::new("grid", kind, "one of the agreed accuracy").into()),
-        };
-        if head & MOVED != 0 {
-            grid = crate::decode::read_phase(grid, &mut reader)?;
-        }
-        let usual = unzigzag(reader.varint()?);
-        let [k] = reader.array()?;
+    /// If a reader's bytes are not a start.
+    pub fn code_start<F: Fields>(&self, fields: &mut F, own: Option<&Start>) -> Result<Start, Error> {
+        let (kind, flags) = own.map_or((0, 0), |start| start.grid.form());
+        let flags = (flags & STEPS) << 3 | (flags & (PHASE | SINGLE)) << 2;
+        let rests = if own.is_some_and(|start| start.rests) { RESTS } else { 0 };
+        let head = fields.byte(kind | flags | rests)?;
+        let form = (head & 15, head >> 3 & STEPS | head >> 2 & (PHASE | SINGLE));
+        let grid = self.code_grid(fields, own.map(|start| &start.grid), form)?;
+        let usual = fields.signed(own.map_or(0, |start| start.usual))?;
+        let k = fields.byte(own.map_or(0, |start| start.k))?;
         if usual.unsigned_abs() > LARGEST as u64 || k > MOST_BITS {
             return Err(Damaged::new("usual index", usual, "at most 2^46 in size").into());
         }
-        *bytes = reader.0;
         let rests = head & RESTS != 0;
         Ok(Start { grid, usual, k, rests })
     }

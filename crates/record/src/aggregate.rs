@@ -2,7 +2,7 @@
 
 use crate::block::Cells;
 use crate::error::Damage;
-use crate::wire::{Bytes, push_varint};
+use crate::wire::Fields;
 
 /// Number, smallest, largest and mean of finite values. Gaps, NaN and infinities are left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,7 +26,7 @@ impl Default for Aggregate {
 
 /// Number of values whose sum is added to the others.
 const PART: u64 = 256;
-/// Largest size of a content of [`Aggregate::push`] in bytes.
+/// Largest size of the fields of an aggregate in bytes.
 pub(crate) const MAX_BYTES: usize = 34;
 
 impl Aggregate {
@@ -101,32 +101,20 @@ impl Aggregate {
         (self.count > 0).then_some(self.mean)
     }
 
-    /// Appends it, for a block of so many rows.
-    pub(crate) fn push(&self, bytes: &mut Vec<u8>, rows: u64) {
-        let is_constant = self.low.to_bits() == self.high.to_bits();
-        push_varint(bytes, rows.saturating_sub(self.count) << 1 | u64::from(is_constant));
-        if self.count > 0 {
-            bytes.extend(self.low.to_le_bytes());
-            if !is_constant {
-                bytes.extend(self.high.to_le_bytes());
-                bytes.extend(self.mean.to_le_bytes());
-            }
-        }
-    }
-
-    /// Reads what [`push`](Self::push) wrote.
-    pub(crate) fn read(reader: &mut Bytes<'_>, rows: u64) -> Result<Self, Damage> {
+    /// The fields of an aggregate of a block of so many rows; a reader may be given any.
+    pub(crate) fn code<F: Fields>(fields: &mut F, own: Self, rows: u64) -> Result<Self, Damage> {
         let damaged = Damage::Content("aggregate of a block");
-        let head = reader.varint()?;
+        let is_constant = own.low.to_bits() == own.high.to_bits();
+        let head = fields.varint(rows.saturating_sub(own.count) << 1 | u64::from(is_constant))?;
         let count = rows.checked_sub(head >> 1).ok_or(damaged)?;
         if count == 0 {
             return Ok(Self::default());
         }
-        let low = reader.f64()?;
+        let low = fields.f64(own.low)?;
         let (high, mean) = if head & 1 == 1 {
             (low, low)
         } else {
-            (reader.f64()?, reader.f64()?)
+            (fields.f64(own.high)?, fields.f64(own.mean)?)
         };
         if low.is_finite() && high.is_finite() && low <= mean && mean <= high {
             Ok(Self { count, low, high, mean })
@@ -146,6 +134,7 @@ pub(crate) fn of_columns(columns: &[Cells]) -> Vec<Aggregate> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::wire::{Bytes, written};
 
     #[test]
     fn aggregates_return_from_bytes() {
@@ -157,11 +146,11 @@ mod tests {
             vec![0.1; 7],
         ] {
             let aggregate = Aggregate::of(values.iter().copied());
-            let mut bytes = Vec::new();
-            aggregate.push(&mut bytes, values.len() as u64 + 2);
+            let rows = values.len() as u64 + 2;
+            let bytes = written(|bytes| Aggregate::code(bytes, aggregate, rows));
             assert!(bytes.len() <= MAX_BYTES);
             let mut reader = Bytes(&bytes);
-            assert_eq!(Aggregate::read(&mut reader, values.len() as u64 + 2).unwrap(), aggregate);
+            assert_eq!(Aggregate::code(&mut reader, Aggregate::default(), rows).unwrap(), aggregate);
             assert!(reader.0.is_empty());
         }
     }

@@ -10,7 +10,7 @@
 //! A recording of a single block has another header than one that goes on, so it is copied beside and takes the recording's place at the end.
 
 use crate::error::Error;
-use crate::wire::{CHECK_BYTES, checksum};
+use crate::wire::{CHECK_BYTES, checksum, with_checksum};
 use std::fs::File;
 use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -57,66 +57,60 @@ pub(crate) fn roll_back(file: &mut File, path: &Path, offset: u64, tail: &[u8]) 
 
 /// An append that may be undone. Dropped before [`commit`](Self::commit), it puts the recording back.
 #[derive(Debug)]
-pub(crate) struct Append(State);
+pub(crate) struct Append(Option<Open>);
+
+/// An append to a file, and the path of the recording.
+#[derive(Debug)]
+struct Open {
+    file: File,
+    path: PathBuf,
+    state: State,
+}
 
 #[derive(Debug)]
 enum State {
-    /// Nothing was written yet.
-    Planned {
-        file: File,
-        path: PathBuf,
-        offset: u64,
-    },
-    /// The bytes from `offset` on are overwritten.
-    InPlace {
-        file: File,
-        path: PathBuf,
-        offset: u64,
-        tail: Vec<u8>,
-    },
+    /// Nothing is overwritten yet; blocks are to be written from this offset on.
+    Planned(u64),
+    /// The bytes from this offset on, which are these, are overwritten.
+    InPlace(u64, Vec<u8>),
     /// A copy grows beside. The lock is that of the recording.
-    Copy {
-        file: File,
-        #[expect(dead_code, reason = "held, not read")]
-        locked: File,
-        path: PathBuf,
-    },
-    Done,
+    Copy(#[expect(dead_code, reason = "held, not read")] File),
 }
 
 impl Append {
     /// Nothing to undo.
     pub(crate) fn none() -> Self {
-        Self(State::Done)
+        Self(None)
     }
 
     /// An append to this file from `offset` on.
     pub(crate) fn planned(file: File, path: &Path, offset: u64) -> Self {
-        let path = path.to_owned();
-        Self(State::Planned { file, path, offset })
+        Self::new(file, path, State::Planned(offset))
     }
 
     /// An append to a copy beside; `locked` holds the lock of the recording.
     pub(crate) fn copy(file: File, locked: File, path: &Path) -> Self {
+        Self::new(file, path, State::Copy(locked))
+    }
+
+    fn new(file: File, path: &Path, state: State) -> Self {
         let path = path.to_owned();
-        Self(State::Copy { file, locked, path })
+        Self(Some(Open { file, path, state }))
     }
 
     /// Must be called before the first byte is written.
     pub(crate) fn begin(&mut self) -> Result<(), Error> {
-        let State::Planned { file, path, offset } = &mut self.0 else {
+        let Some(Open { file, path, state }) = &mut self.0 else {
             return Ok(());
         };
-        let offset = *offset;
+        let State::Planned(offset) = *state else {
+            return Ok(());
+        };
         let mut keep = || -> std::io::Result<Vec<u8>> {
             let mut tail = Vec::new();
             file.seek(SeekFrom::Start(offset))?;
             file.read_to_end(&mut tail)?;
-            let mut bytes = MAGIC.to_vec();
-            bytes.extend(offset.to_le_bytes());
-            bytes.extend_from_slice(&tail);
-            let check = checksum(&[&bytes]);
-            bytes.extend(check.to_le_bytes());
+            let bytes = with_checksum([&MAGIC[..], &offset.to_le_bytes(), &tail].concat());
             let mut kept = File::create(beside(path))?;
             kept.write_all(&bytes)?;
             kept.sync_all()?;
@@ -125,52 +119,41 @@ impl Append {
             file.seek(SeekFrom::Start(offset))?;
             Ok(tail)
         };
-        let tail = keep().map_err(Error::io("keep the end of"))?;
-        if let State::Planned { file, path, offset } = std::mem::replace(&mut self.0, State::Done) {
-            self.0 = State::InPlace {
-                file,
-                path,
-                offset,
-                tail,
-            };
-        }
+        *state = State::InPlace(offset, keep().map_err(Error::io("keep the end of"))?);
         Ok(())
     }
 
     /// What was written so far stays.
     pub(crate) fn commit(&mut self) -> Result<(), Error> {
-        let done = match &self.0 {
-            State::Planned { .. } | State::Done => return Ok(()),
-            State::InPlace { file, path, .. } => file.sync_data().and_then(|()| std::fs::remove_file(beside(path))),
-            State::Copy { file, path, .. } => file.sync_data().and_then(|()| {
+        let Some(Open { file, path, state }) = &self.0 else {
+            return Ok(());
+        };
+        let done = match state {
+            State::Planned(_) => return Ok(()),
+            State::InPlace(..) => file.sync_data().and_then(|()| std::fs::remove_file(beside(path))),
+            State::Copy(_) => file.sync_data().and_then(|()| {
                 std::fs::rename(beside(path), path)?;
                 sync_folder(path);
                 Ok(())
             }),
         };
         done.map_err(Error::io("complete"))?;
-        self.0 = State::Done;
+        self.0 = None;
         Ok(())
     }
 }
 
 impl Drop for Append {
     fn drop(&mut self) {
+        let Some(Open { file, path, state }) = &mut self.0 else {
+            return;
+        };
         // Nobody can be told of a failure here: the bytes that were kept are still there, and the next append puts them back.
-        match &mut self.0 {
-            State::Planned { .. } | State::Done => {}
-            State::InPlace {
-                file,
-                path,
-                offset,
-                tail,
-            } => {
-                let _ = roll_back(file, path, *offset, tail);
-            }
-            State::Copy { path, .. } => {
-                let _ = std::fs::remove_file(beside(path));
-            }
-        }
+        let _ = match state {
+            State::Planned(_) => Ok(()),
+            State::InPlace(offset, tail) => roll_back(file, path, *offset, tail),
+            State::Copy(_) => std::fs::remove_file(beside(path)).map_err(Error::io("remove a copy of")),
+        };
     }
 }
 

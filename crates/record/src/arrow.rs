@@ -15,12 +15,10 @@ use crate::recorder::Recorder;
 use crate::schema::{Schema, TimeBase, TimeFormat};
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    ArrowPrimitiveType, Date32Type, Date64Type, Decimal32Type, Decimal64Type, Decimal128Type, DurationMicrosecondType,
-    DurationMillisecondType, DurationNanosecondType, DurationSecondType, Float32Type, Float64Type, Int8Type, Int16Type,
-    Int32Type, Int64Type, TimestampMicrosecondType, TimestampMillisecondType, TimestampNanosecondType,
-    TimestampSecondType, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
+    ArrowPrimitiveType, Date32Type, Decimal32Type, Decimal64Type, Decimal128Type, Float32Type, Float64Type, Int8Type,
+    Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
 };
-use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, PrimitiveArray, RecordBatch};
+use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, RecordBatch, make_array};
 use arrow_schema::{DataType, Field, TimeUnit};
 use fewbits_block_codec::ArgumentError;
 use std::collections::HashMap;
@@ -30,55 +28,47 @@ use std::sync::Arc;
 /// Integers up to this size are exact doubles.
 const MAX_WHOLE: i64 = 1 << 53;
 
-/// The unit of timestamps with as many decimals as the ticks; `None` for other time bases.
-fn unit_of(time: TimeBase) -> Option<TimeUnit> {
-    match time {
-        TimeBase::Clock {
-            decimals,
-            format: TimeFormat::Utc | TimeFormat::Local,
-            ..
-        } => match decimals {
-            0 => Some(TimeUnit::Second),
-            3 => Some(TimeUnit::Millisecond),
-            6 => Some(TimeUnit::Microsecond),
-            9 => Some(TimeUnit::Nanosecond),
-            _ => None,
-        },
-        _ => None,
-    }
-}
-
-/// The zone of timestamps; `None` for local times.
-fn zone_of(time: TimeBase) -> Option<Arc<str>> {
-    let is_utc = matches!(
-        time,
-        TimeBase::Clock {
-            format: TimeFormat::Utc,
-            ..
-        }
-    );
-    is_utc.then(|| "UTC".into())
-}
+const UNITS: [(u8, TimeUnit); 4] = [
+    (0, TimeUnit::Second),
+    (3, TimeUnit::Millisecond),
+    (6, TimeUnit::Microsecond),
+    (9, TimeUnit::Nanosecond),
+];
 
 fn decimals_of(unit: TimeUnit) -> u8 {
-    match unit {
-        TimeUnit::Second => 0,
-        TimeUnit::Millisecond => 3,
-        TimeUnit::Microsecond => 6,
-        TimeUnit::Nanosecond => 9,
+    let found = UNITS.iter().find(|(_, own)| *own == unit);
+    found.map_or(0, |(decimals, _)| *decimals)
+}
+
+/// The type of times: timestamps with as many decimals as the ticks if there are such, and ticks otherwise.
+fn type_of(time: TimeBase) -> DataType {
+    let TimeBase::Clock { decimals, format, .. } = time else {
+        return DataType::Int64;
+    };
+    let unit = UNITS.iter().find(|(own, _)| *own == decimals);
+    match (format, unit) {
+        (TimeFormat::Utc, Some((_, unit))) => DataType::Timestamp(*unit, Some("UTC".into())),
+        (TimeFormat::Local, Some((_, unit))) => DataType::Timestamp(*unit, None),
+        _ => DataType::Int64,
     }
+}
+
+/// Cells of 64 bits as another type of 64 bits.
+fn retyped(array: &dyn Array, kind: DataType) -> Result<ArrayRef, Error> {
+    Ok(make_array(array.to_data().into_builder().data_type(kind).build()?))
 }
 
 impl Schema {
     /// The fields of batches of this recording. Units, and the decimals of ticks, are in the metadata.
     pub fn to_arrow(&self) -> arrow_schema::Schema {
-        let time = match (self.time, unit_of(self.time)) {
-            (_, Some(unit)) => Field::new("time", DataType::Timestamp(unit, zone_of(self.time)), false),
-            (TimeBase::Clock { decimals, .. }, None) => {
+        let kind = type_of(self.time);
+        let time = match self.time {
+            TimeBase::Numbered => Field::new("row", kind, false),
+            TimeBase::Clock { decimals, .. } if kind == DataType::Int64 => {
                 let decimals = HashMap::from([("decimals".to_owned(), decimals.to_string())]);
-                Field::new("time", DataType::Int64, false).with_metadata(decimals)
+                Field::new("time", kind, false).with_metadata(decimals)
             }
-            (TimeBase::Numbered, None) => Field::new("row", DataType::Int64, false),
+            TimeBase::Clock { .. } => Field::new("time", kind, false),
         };
         let columns = self.columns.iter().map(|column| {
             let kind = match column.integers {
@@ -107,14 +97,8 @@ impl Block {
             let given = format!("{} columns", self.columns.len());
             return Err(ArgumentError::new("schema", given, format!("{}", schema.columns.len())).into());
         }
-        let ticks = || self.ticks.iter().copied();
-        let time: ArrayRef = match unit_of(schema.time) {
-            Some(TimeUnit::Second) => stamps::<TimestampSecondType>(ticks(), zone_of(schema.time)),
-            Some(TimeUnit::Millisecond) => stamps::<TimestampMillisecondType>(ticks(), zone_of(schema.time)),
-            Some(TimeUnit::Microsecond) => stamps::<TimestampMicrosecondType>(ticks(), zone_of(schema.time)),
-            Some(TimeUnit::Nanosecond) => stamps::<TimestampNanosecondType>(ticks(), zone_of(schema.time)),
-            None => Arc::new(Int64Array::from_iter_values(ticks())),
-        };
+        let ticks = Int64Array::from_iter_values(self.ticks.iter().copied());
+        let time = retyped(&ticks, type_of(schema.time))?;
         let asked = (0..self.columns.len()).filter(|i| self.columns[*i].len() == self.rows());
         let kept: Vec<usize> = asked.collect();
         let cells = kept
@@ -135,13 +119,6 @@ fn array(cells: &[Option<f64>], integers: Option<Integers>) -> ArrayRef {
             Arc::new(numbers.collect::<Int64Array>())
         }
     }
-}
-
-fn stamps<T>(ticks: impl Iterator<Item = i64>, zone: Option<Arc<str>>) -> ArrayRef
-where
-    T: arrow_array::types::ArrowTimestampType,
-{
-    Arc::new(PrimitiveArray::<T>::from_iter_values(ticks).with_timezone_opt(zone))
 }
 
 /// The double nearest to `unscaled 10^-scale`; nothing for more than 53 bits.
@@ -165,10 +142,7 @@ pub fn cells(name: &str, array: &dyn Array) -> Result<Cells, Error> {
     fn of<T: ArrowPrimitiveType>(array: &dyn Array, number: impl Fn(T::Native) -> Option<f64>) -> Option<Cells> {
         let cells = array.as_primitive::<T>().iter();
         cells
-            .map(|cell| match cell {
-                None => Some(None),
-                Some(cell) => Some(Some(number(cell)?)),
-            })
+            .map(|cell| cell.map_or(Some(None), |cell| number(cell).map(Some)))
             .collect()
     }
     let refuse = |given: String, expected: &str| -> Error { ArgumentError::new("column", given, expected).into() };
@@ -196,12 +170,7 @@ pub fn cells(name: &str, array: &dyn Array) -> Result<Cells, Error> {
         DataType::Decimal128(_, scale) => of::<Decimal128Type>(array, |x| decimal(x, *scale)),
         DataType::Duration(unit) => {
             let seconds = |ticks: i64| decimal(ticks.into(), decimals_of(*unit) as i8);
-            match unit {
-                TimeUnit::Second => of::<DurationSecondType>(array, seconds),
-                TimeUnit::Millisecond => of::<DurationMillisecondType>(array, seconds),
-                TimeUnit::Microsecond => of::<DurationMicrosecondType>(array, seconds),
-                TimeUnit::Nanosecond => of::<DurationNanosecondType>(array, seconds),
-            }
+            of::<Int64Type>(&retyped(array, DataType::Int64)?, seconds)
         }
         other => return Err(refuse(format!("`{name}` of {other}"), "numbers: leave the column out, or cast it")),
     };
@@ -217,12 +186,8 @@ fn codes(name: &str, array: &dyn Array, integers: Integers) -> Result<Cells, Err
             .collect());
     }
     let numbers = cells(name, array)?.into_iter();
-    let codes: Option<Cells> = numbers
-        .map(|number| match number {
-            None => Some(None),
-            Some(number) => Some(Some(integers.code_of(number)?)),
-        })
-        .collect();
+    let code = |number: Option<f64>| number.map_or(Some(None), |number| integers.code_of(number).map(Some));
+    let codes: Option<Cells> = numbers.map(code).collect();
     codes.ok_or_else(|| ArgumentError::new("column", format!("`{name}`"), "whole numbers of 64 bits").into())
 }
 
@@ -236,26 +201,17 @@ pub fn ticks(name: &str, array: &dyn Array, decimals: u8) -> Result<Vec<i64>, Er
     if array.null_count() > 0 {
         return Err(refuse(format!("`{name}` with gaps"), "a time in every row"));
     }
-    if *array.data_type() == DataType::Date32 {
-        let day = 86_400 * 10_i64.pow(decimals.into());
-        let days = array.as_primitive::<Date32Type>().values().iter();
-        let ticks: Option<Vec<i64>> = days.map(|days| i64::from(*days).checked_mul(day)).collect();
-        return ticks.ok_or_else(|| {
-            refuse(format!("`{name}`"), &format!("dates that fit 64 bits with {decimals} decimals of a second"))
-        });
-    }
-    let (numbers, unit) = match array.data_type() {
-        DataType::Date64 => (array.as_primitive::<Date64Type>().values(), Some(TimeUnit::Millisecond)),
-        DataType::Int64 => (array.as_primitive::<Int64Type>().values(), None),
-        DataType::Timestamp(unit, _) => {
-            let values = match unit {
-                TimeUnit::Second => array.as_primitive::<TimestampSecondType>().values(),
-                TimeUnit::Millisecond => array.as_primitive::<TimestampMillisecondType>().values(),
-                TimeUnit::Microsecond => array.as_primitive::<TimestampMicrosecondType>().values(),
-                TimeUnit::Nanosecond => array.as_primitive::<TimestampNanosecondType>().values(),
-            };
-            (values, Some(*unit))
+    let refused = || refuse(format!("`{name}`"), &format!("times that are ticks of {decimals} decimals of a second"));
+    let unit = match array.data_type() {
+        DataType::Date32 => {
+            let days = array.as_primitive::<Date32Type>().values().iter();
+            let day = 86_400 * 10_i64.pow(decimals.into());
+            let ticks: Option<Vec<i64>> = days.map(|days| i64::from(*days).checked_mul(day)).collect();
+            return ticks.ok_or_else(refused);
         }
+        DataType::Date64 => Some(TimeUnit::Millisecond),
+        DataType::Int64 => None,
+        DataType::Timestamp(unit, _) => Some(*unit),
         other => return Err(refuse(format!("`{name}` of {other}"), "timestamps, dates or 64-bit integers")),
     };
     let shift = unit.map_or(0, |unit| i32::from(decimals) - i32::from(decimals_of(unit)));
@@ -264,14 +220,16 @@ pub fn ticks(name: &str, array: &dyn Array, decimals: u8) -> Result<Vec<i64>, Er
         0 => Some(*tick),
         1.. => tick.checked_mul(scale?),
         // A coarser unit must divide the tick: no time is rounded.
-        _ => Some(*tick)
-            .filter(|tick| scale.is_some_and(|scale| tick % scale == 0))
-            .zip(scale)
-            .map(|(t, s)| t / s),
+        _ => scale.filter(|scale| tick % scale == 0).map(|scale| tick / scale),
     };
-    let ticks: Option<Vec<i64>> = numbers.iter().map(scaled).collect();
-    ticks
-        .ok_or_else(|| refuse(format!("`{name}`"), &format!("times that are ticks of {decimals} decimals of a second")))
+    let numbers = retyped(array, DataType::Int64)?;
+    let ticks: Option<Vec<i64>> = numbers
+        .as_primitive::<Int64Type>()
+        .values()
+        .iter()
+        .map(scaled)
+        .collect();
+    ticks.ok_or_else(refused)
 }
 
 impl<W: Write> Recorder<W> {

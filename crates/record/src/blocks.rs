@@ -1,12 +1,10 @@
 //! The blocks and rows of a recording one after the other, by its index or by a scan.
 
-use crate::aggregate::Aggregate;
 use crate::block::{self, Block};
 use crate::error::{Damage, Error};
-use crate::index::{Entry, Segment};
+use crate::index::{self, BlockInfo, Segment};
 use crate::playback::{Index, Playback, Row, entries, read_at};
-use crate::scan::{Order, Scanner, no_bytes};
-use std::collections::VecDeque;
+use crate::scan::{Order, Scanner};
 use std::io::{Read, Seek, SeekFrom};
 
 impl<R: Read + Seek> Playback<R> {
@@ -32,16 +30,20 @@ impl<R: Read + Seek> Playback<R> {
     }
 }
 
-/// Ticks of a block, its rows, and the aggregates of its columns.
-pub(crate) type Known = ((i64, i64), (u64, Vec<Aggregate>));
+/// What comes next.
+pub(crate) enum Part {
+    /// A block that is not read yet, as the index describes it.
+    Known(BlockInfo),
+    Found(Block),
+}
 
 /// Iterator over [`Block`]s.
 pub struct Blocks<'a, R> {
     playback: &'a mut Playback<R>,
     ticks: (i64, i64),
     next_segment: usize,
-    /// Offsets and entries of the segment that is read at present.
-    entries: VecDeque<(u64, Entry)>,
+    /// Entries of the segment that is read at present.
+    entries: std::vec::IntoIter<BlockInfo>,
     /// The bytes without index that are scanned at present, and the offset of their end.
     scan: Option<(Scanner, u64)>,
     scanned: bool,
@@ -57,7 +59,7 @@ impl<'a, R> Blocks<'a, R> {
         Self {
             ticks,
             next_segment: 0,
-            entries: VecDeque::new(),
+            entries: Vec::new().into_iter(),
             scan: None,
             scanned: false,
             last_number: None,
@@ -72,53 +74,11 @@ impl<R: Read + Seek> Blocks<'_, R> {
         ticks.0 <= self.ticks.1 && ticks.1 >= self.ticks.0
     }
 
-    /// The ticks of the next block, and its rows and aggregates, if the index has them and they are wanted: the block is passed over.
-    ///
-    /// # Errors
-    /// If reading fails.
-    pub(crate) fn known(&mut self, is_wanted: impl Fn((i64, i64)) -> bool) -> Result<Option<Known>, Error> {
-        if self.scan.is_some() || self.single {
-            return Ok(None);
-        }
-        while self.entries.is_empty() {
-            let Index::Whole(segments) = &self.playback.index else {
-                return Ok(None);
-            };
-            let Some(segment) = segments.get(self.next_segment).copied() else {
-                return Ok(None);
-            };
-            self.next_segment += 1;
-            if segment.rows == 0 || self.overlaps(segment.ticks) {
-                self.enter(&segment)?;
-                if self.scan.is_some() {
-                    return Ok(None);
-                }
-            }
-        }
-        // As in `next`: entries before the ticks asked for are passed over.
-        while let Some((_, entry)) = self.entries.front()
-            && entry.rows > 0
-            && !self.overlaps(entry.ticks)
-        {
-            self.entries.pop_front();
-        }
-        let is_known =
-            |(_, entry): &(u64, Entry)| entry.rows > 0 && entry.aggregates.is_some() && is_wanted(entry.ticks);
-        let known = self.entries.front().is_some_and(is_known);
-        let next = if known { self.entries.pop_front() } else { None };
-        Ok(next.and_then(|(_, entry)| Some((entry.ticks, (entry.rows, entry.aggregates?)))))
-    }
-
     /// Reads the entries of a segment. If it is damaged, its blocks are searched.
     fn enter(&mut self, segment: &Segment) -> Result<(), Error> {
         match entries(&mut self.playback.reader, &self.playback.header, segment)? {
             Some(found) => {
-                let mut offset = segment.start;
-                for entry in found {
-                    let next = offset.saturating_add(entry.length);
-                    self.entries.push_back((offset, entry));
-                    offset = next;
-                }
+                self.entries = found.into_iter();
                 Ok(())
             }
             None => {
@@ -129,34 +89,28 @@ impl<R: Read + Seek> Blocks<'_, R> {
         }
     }
 
-    /// The next block of an indexed segment.
-    fn indexed(&mut self, offset: u64, entry: &Entry) -> Result<Block, Error> {
-        let damaged = |damage| Error::Block {
-            offset,
-            bytes: entry.length,
-            damage,
-        };
+    /// The block that this entry describes.
+    fn indexed(&mut self, entry: &BlockInfo) -> Result<Block, Error> {
+        let damaged = |damage| Error::block(entry.offset, entry.bytes, damage);
         let header = &self.playback.header;
         // The length before a block and the checksum after it take at most 14 bytes. Nothing longer is read, whatever the index says.
         let limit = block::max_bytes(header) as u64 + 16;
-        if entry.length > limit || entry.rows == 0 {
+        if entry.bytes > limit || entry.rows == 0 {
             return Err(damaged(Damage::NoBlock));
         }
-        let bytes = read_at(&mut self.playback.reader, offset, entry.length)?.ok_or(damaged(Damage::CutOff))?;
-        if block::length(header, &bytes).map_err(damaged)? as u64 != entry.length {
+        let bytes = read_at(&mut self.playback.reader, entry.offset, entry.bytes)?.ok_or(damaged(Damage::CutOff))?;
+        if block::length(header, &bytes).map_err(damaged)? as u64 != entry.bytes {
             return Err(damaged(Damage::NoBlock));
         }
         let chosen = &self.playback.chosen;
         let block = block::decode(header, &bytes, |column| chosen.contains(&column)).map_err(damaged)?;
         // Another block of the recording that was put here is not what the index describes, or has been read before.
         let tolerance = header.schema.time.tolerance();
-        let ends = block
-            .ticks
-            .iter()
-            .fold((i64::MAX, i64::MIN), |(l, h), tick| (l.min(*tick), h.max(*tick)));
-        let is_described = block.rows() as u64 == entry.rows
-            && ends.0.abs_diff(entry.ticks.0) <= tolerance
-            && ends.1.abs_diff(entry.ticks.1) <= tolerance;
+        let is_near = |(first, last): (i64, i64)| {
+            first.abs_diff(entry.ticks.0) <= tolerance && last.abs_diff(entry.ticks.1) <= tolerance
+        };
+        let ends = index::ends_of(&block.ticks);
+        let is_described = block.rows() as u64 == entry.rows && ends.is_some_and(is_near);
         if !is_described || (block.number.is_some() && block.number <= self.last_number) {
             return Err(damaged(Damage::Misplaced));
         }
@@ -186,48 +140,38 @@ impl<R: Read + Seek> Blocks<'_, R> {
         Ok(())
     }
 
-    /// The only block of a recording.
-    fn only(&self) -> Result<Block, Error> {
-        let content = self.playback.single.as_deref().unwrap_or_default();
-        self.playback
-            .only(content, |column| self.playback.chosen.contains(&column))
-    }
-}
-
-impl<R: Read + Seek> Iterator for Blocks<'_, R> {
-    type Item = Result<Block, Error>;
-
-    fn next(&mut self) -> Option<Self::Item> {
+    /// What comes next. A block that is [`Part::Known`] may be passed over.
+    pub(crate) fn part(&mut self) -> Option<Result<Part, Error>> {
         if std::mem::take(&mut self.single) {
-            return Some(self.only());
+            let block = self.playback.only(|column| self.playback.chosen.contains(&column))?;
+            return Some(block.map(Part::Found));
         }
         loop {
             if self.scan.is_some() {
                 match self.scanned() {
-                    Some(block) => return Some(block),
+                    Some(block) => return Some(block.map(Part::Found)),
                     None if self.playback.index == Index::Missing => {
-                        return Some(Err(no_bytes(self.playback.span.1, Damage::NoEnd)));
+                        return Some(Err(Error::block(self.playback.span.1, 0, Damage::NoEnd)));
                     }
                     None => continue,
                 }
             }
-            if let Some((offset, entry)) = self.entries.pop_front() {
+            if let Some(entry) = self.entries.next() {
                 // An entry without rows stands for damaged bytes, whose times are unknown: they are reported for every range.
                 if entry.rows > 0 && !self.overlaps(entry.ticks) {
                     continue;
                 }
-                return Some(self.indexed(offset, &entry));
+                return Some(Ok(Part::Known(entry)));
             }
             let Index::Whole(segments) = &self.playback.index else {
-                if self.scanned {
+                if std::mem::replace(&mut self.scanned, true) {
                     return None;
                 }
-                self.scanned = true;
                 if let Err(error) = self.start_scan(self.playback.span, Order::default()) {
                     return Some(Err(error));
                 }
                 if self.playback.index == Index::Other {
-                    return Some(Err(no_bytes(self.playback.span.1, Damage::Index)));
+                    return Some(Err(Error::block(self.playback.span.1, 0, Damage::Index)));
                 }
                 continue;
             };
@@ -240,6 +184,23 @@ impl<R: Read + Seek> Iterator for Blocks<'_, R> {
                 return Some(Err(error));
             }
         }
+    }
+
+    /// The block of this part.
+    pub(crate) fn block(&mut self, part: Part) -> Result<Block, Error> {
+        match part {
+            Part::Known(entry) => self.indexed(&entry),
+            Part::Found(block) => Ok(block),
+        }
+    }
+}
+
+impl<R: Read + Seek> Iterator for Blocks<'_, R> {
+    type Item = Result<Block, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let part = self.part()?;
+        Some(part.and_then(|part| self.block(part)))
     }
 }
 

@@ -66,19 +66,6 @@ impl Bound {
     }
 }
 
-/// The bound for one block, with shares converted to numbers.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Promise {
-    /// Same 64 bits.
-    Exact,
-    /// Within this distance, on a circle if there is one.
-    Within(f64),
-    /// Numbers of this many decimals exactly, others within half a unit of the last.
-    Decimals(u8),
-    /// Within a share of the sample's size, or within the floor.
-    Relative { share: f64, floor: f64 },
-}
-
 /// Powers of ten that doubles represent exactly.
 pub(crate) const TENS: [f64; 16] = [
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
@@ -91,12 +78,13 @@ pub(crate) fn decimal(value: f64, places: u8) -> Option<i64> {
     (scaled.abs() < 9e15 && scaled / ten == value).then_some(scaled as i64)
 }
 
-impl Promise {
-    /// Whether `restored` is within the bound of `sample`; both are finite.
+impl Bound {
+    /// Whether `restored` is within the bound of `sample`; both are finite. Of a share the range must be known: nothing else is within it
+    /// than the sample.
     pub(crate) fn holds(self, sample: f64, restored: f64, period: Option<f64>) -> bool {
         match self {
-            Self::Exact => sample.to_bits() == restored.to_bits(),
-            Self::Within(delta) => match period {
+            Self::Lossless | Self::ShareOfRange(_) => sample.to_bits() == restored.to_bits(),
+            Self::Absolute(delta) => match period {
                 None => is_within(sample, restored, delta),
                 Some(period) => is_within_on_circle(sample, restored, delta, period),
             },
@@ -172,6 +160,6 @@ mod tests {
     #[test]
     fn decimals_are_found() {
         assert_eq!((decimal(22.482, 3), decimal(22.482, 2), decimal(-0.1, 1)), (Some(22_482), None, Some(-1)));
-        assert!(Promise::Decimals(1).holds(0.26, 0.3, None) && !Promise::Decimals(1).holds(0.2, 0.21, None));
+        assert!(Bound::Decimals(1).holds(0.26, 0.3, None) && !Bound::Decimals(1).holds(0.2, 0.21, None));
     }
 }

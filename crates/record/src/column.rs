@@ -1,6 +1,6 @@
 //! One column of a recording: name, unit, error bound.
 
-use crate::bound::{Bound, Promise};
+use crate::bound::Bound;
 use crate::error::Error;
 use crate::integers::Integers;
 use fewbits_block_codec::ArgumentError;
@@ -105,14 +105,7 @@ impl Column {
             let expected = "an absolute bound, a share of the range or lossless for a column on a circle";
             return Err(ArgumentError::new("bound", format!("{:?}", self.bound), expected).into());
         }
-        let smallest = match self.bound {
-            Bound::Absolute(delta) => delta,
-            Bound::ShareOfRange(share) => share * period,
-            Bound::Lossless | Bound::Decimals(_) | Bound::Relative { .. } => period,
-        };
-        if smallest.is_nan() || period / smallest > MAX_CIRCLE_CELLS {
-            return Err(ArgumentError::new("period", period, "at most 2^40 times the bound").into());
-        }
+        check_circle(self.bound, period)?;
         Ok(Self {
             period: Some(period),
             ..self
@@ -176,29 +169,26 @@ impl Column {
         if sample.to_bits() == restored.to_bits() || !sample.is_finite() || !restored.is_finite() {
             return sample.to_bits() == restored.to_bits();
         }
-        self.whole_promise(share_bound.unwrap_or(0.0))
+        self.whole_bound(share_bound.unwrap_or(0.0))
             .holds(sample, restored, self.period)
     }
 
     /// The bound relative to the original samples: with that of the recordings that the samples come from.
-    fn whole_promise(&self, share_bound: f64) -> Promise {
-        match self.promise(share_bound) {
-            promise if self.earlier == 0.0 => promise,
+    fn whole_bound(&self, share_bound: f64) -> Bound {
+        match self.bound_in(share_bound) {
+            bound if self.earlier == 0.0 => bound,
             // The sum may have been rounded down, and both bounds can be reached.
-            Promise::Within(delta) => Promise::Within((delta + self.earlier).next_up()),
-            _ => Promise::Within(self.earlier),
+            Bound::Absolute(delta) => Bound::Absolute((delta + self.earlier).next_up()),
+            _ => Bound::Absolute(self.earlier),
         }
     }
 
     /// The bound in a block; `share_bound` is the value of a share there, 0 for lossless.
-    pub(crate) fn promise(&self, share_bound: f64) -> Promise {
+    pub(crate) fn bound_in(&self, share_bound: f64) -> Bound {
         match self.bound {
-            Bound::Lossless => Promise::Exact,
-            Bound::Absolute(delta) => Promise::Within(delta),
-            Bound::Decimals(places) => Promise::Decimals(places),
-            Bound::Relative { share, floor } => Promise::Relative { share, floor },
-            Bound::ShareOfRange(_) if share_bound > 0.0 => Promise::Within(share_bound),
-            Bound::ShareOfRange(_) => Promise::Exact,
+            Bound::ShareOfRange(_) if share_bound > 0.0 => Bound::Absolute(share_bound),
+            Bound::ShareOfRange(_) => Bound::Lossless,
+            bound => bound,
         }
     }
 
@@ -206,6 +196,19 @@ impl Column {
     pub(crate) fn known_range(&self) -> Option<f64> {
         self.period.or(self.range)
     }
+}
+
+/// Refuses a circle of more cells than the codec's indices can count.
+pub(crate) fn check_circle(bound: Bound, period: f64) -> Result<(), ArgumentError> {
+    let smallest = match bound {
+        Bound::Absolute(delta) => delta,
+        Bound::ShareOfRange(share) => share * period,
+        Bound::Lossless | Bound::Decimals(_) | Bound::Relative { .. } => period,
+    };
+    if smallest.is_nan() || period / smallest > MAX_CIRCLE_CELLS {
+        return Err(ArgumentError::new("period", period, "at most 2^40 times the bound"));
+    }
+    Ok(())
 }
 
 /// A text of at most 1024 bytes.

@@ -128,9 +128,9 @@ impl Error {
         }
     }
 
-    /// Damage of the header.
-    pub(crate) fn header(damage: impl Into<Damage>) -> Self {
-        Self::Header(damage.into())
+    /// Damage of so many bytes.
+    pub(crate) fn block(offset: u64, bytes: u64, damage: Damage) -> Self {
+        Self::Block { offset, bytes, damage }
     }
 
     pub(crate) fn io(action: &'static str) -> impl Fn(io::Error) -> Self {

@@ -2,11 +2,12 @@
 
 use crate::bound::Bound;
 use crate::codec::{Target, adaptive};
-use crate::header_column::{push_column, shortened};
-use crate::schema::{Schema, TimeBase, TimeFormat, default_rows};
+use crate::column::check_circle;
+use crate::header_column::shortened;
+use crate::schema::{Schema, TimeBase};
 use crate::time::Grid;
 pub(crate) use crate::wire::VERSION_5;
-use crate::wire::{checksum, push_text, push_varint, zigzag};
+use crate::wire::written;
 use fewbits_block_codec::Start;
 use std::collections::hash_map::RandomState;
 use std::hash::{BuildHasher, Hasher};
@@ -24,8 +25,8 @@ pub(crate) const IDENTITY_BYTES: usize = 4;
 /// How the blocks follow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Form {
-    /// The only block follows the header, up to a checksum of the whole recording.
-    Single,
+    /// The only block, of so many rows, follows the header, up to a checksum of the whole recording.
+    Single(usize),
     /// Blocks, segments of the index, and an end.
     File,
     /// Blocks over a link. There is no end.
@@ -44,8 +45,6 @@ pub(crate) struct Header {
     pub(crate) form: Form,
     /// Random: the headers of two recordings differ even if their columns are the same. Zero in version 5.
     pub(crate) identity: u32,
-    /// Number of rows of the only block.
-    pub(crate) only: Option<usize>,
     pub(crate) schema: Schema,
     pub(crate) origin: i64,
     pub(crate) step: i64,
@@ -59,12 +58,36 @@ pub(crate) struct Header {
     pub(crate) check: u32,
 }
 
+/// A header before anything is known of it.
+pub(crate) const BLANK: Header = Header {
+    version: VERSION,
+    form: Form::File,
+    identity: 0,
+    schema: Schema {
+        columns: Vec::new(),
+        time: TimeBase::Numbered,
+        rows_per_block: 0,
+        keeps_ticks: false,
+        time_name: String::new(),
+    },
+    origin: 0,
+    step: 1,
+    share_bounds: Vec::new(),
+    starts: Vec::new(),
+    length: 0,
+    check: 0,
+};
+
 impl Header {
     /// The header of a recording whose first rows are known.
     pub(crate) fn new(mut schema: Schema, ticks: &[i64], share_bounds: Vec<f64>) -> Self {
         for column in &mut schema.columns {
-            if let Bound::Absolute(delta) = &mut column.bound {
-                *delta = shortened(*delta);
+            if let Bound::Absolute(delta) = column.bound {
+                let bound = Bound::Absolute(shortened(delta));
+                // A circle may have too many cells of the shorter one.
+                if column.period.is_none_or(|period| check_circle(bound, period).is_ok()) {
+                    column.bound = bound;
+                }
             }
         }
         let grid = match schema.time {
@@ -77,17 +100,13 @@ impl Header {
             TimeBase::Clock { tolerance, .. } => Grid::of(ticks, schema.rows_per_block, tolerance),
         };
         let header = Self {
-            version: VERSION,
-            form: Form::File,
             identity: random(),
-            only: None,
             starts: vec![None; schema.columns.len()],
             schema,
             origin: grid.origin,
             step: grid.step,
             share_bounds: share_bounds.into_iter().map(rounded_down).collect(),
-            length: 0,
-            check: 0,
+            ..BLANK
         };
         header.checked()
     }
@@ -101,8 +120,10 @@ impl Header {
     pub(crate) fn with_starts(mut self, columns: &[Vec<Option<f64>>]) -> Self {
         let start = |(column, cells): (usize, &Vec<Option<f64>>)| {
             let finite: Vec<f64> = cells.iter().flatten().copied().filter(|x| x.is_finite()).collect();
-            let start = adaptive::start(&finite, &self.target(column, None))?;
-            (start.to_bytes().len() <= MAX_START).then_some(start)
+            let target = self.target(column, None);
+            let start = adaptive::start(&finite, &target)?;
+            let bytes = written(|fields| adaptive::code_start(fields, Some(&start), &target));
+            (bytes.len() <= MAX_START).then_some(start)
         };
         self.starts = columns.iter().enumerate().map(start).collect();
         self.checked()
@@ -110,24 +131,15 @@ impl Header {
 
     /// The same header for blocks that follow in another form.
     pub(crate) fn with_form(self, form: Form) -> Self {
-        let only = self.only.filter(|_| form == Form::Single);
-        Self { form, only, ..self }.checked()
-    }
-
-    /// The same header for a recording of a single block of so many rows.
-    pub(crate) fn of_single(self, rows: usize) -> Self {
-        let only = Some(rows);
-        Self { only, ..self }.with_form(Form::Single)
+        Self { form, ..self }.checked()
     }
 
     /// Number of rows of a block that does not state it.
     pub(crate) fn block_rows(&self) -> usize {
-        self.only.unwrap_or(self.schema.rows_per_block)
-    }
-
-    /// Number of rows of the only block, if a block elsewhere must state it.
-    pub(crate) fn odd_rows(&self) -> Option<usize> {
-        self.only.filter(|rows| *rows != self.schema.rows_per_block)
+        match self.form {
+            Form::Single(rows) => rows,
+            _ => self.schema.rows_per_block,
+        }
     }
 
     /// The header of a recording of this version with the same columns.
@@ -149,7 +161,7 @@ impl Header {
         let bytes = self.to_bytes();
         self.length = bytes.len();
         self.check = match self.form {
-            Form::Single => 0,
+            Form::Single(_) => 0,
             _ => bytes.last_chunk::<4>().map_or(0, |check| u32::from_le_bytes(*check)),
         };
         self
@@ -181,103 +193,11 @@ impl Header {
     pub(crate) fn target(&self, column: usize, own: Option<f64>) -> Target {
         let spec = &self.schema.columns[column];
         Target {
-            promise: spec.promise(own.unwrap_or(self.share_bounds[column])),
+            bound: spec.bound_in(own.unwrap_or(self.share_bounds[column])),
             period: spec.period,
         }
     }
-
-    /// The encoded header, of this version: magic bytes, version, length, identity, content, checksum. That of a single block has neither length nor
-    /// identity nor checksum.
-    pub(crate) fn to_bytes(&self) -> Vec<u8> {
-        let body = self.body();
-        let mut bytes = MAGIC.to_vec();
-        if self.form == Form::Single {
-            bytes.push(VERSION | SINGLE);
-            bytes.extend(body);
-            return bytes;
-        }
-        bytes.push(VERSION);
-        push_varint(&mut bytes, body.len() as u64);
-        bytes.extend(self.identity.to_le_bytes());
-        bytes.extend(body);
-        let check = checksum(&[&bytes]);
-        bytes.extend(check.to_le_bytes());
-        bytes
-    }
-
-    fn body(&self) -> Vec<u8> {
-        let mut body = Vec::new();
-        let rows_per_block = self.schema.rows_per_block;
-        match self.only {
-            Some(rows) => {
-                // The default needs no telling.
-                let own = rows_per_block != default_rows(self.schema.columns.len());
-                push_varint(&mut body, 2 * rows as u64 + u64::from(own));
-                if own {
-                    push_varint(&mut body, rows_per_block as u64);
-                }
-            }
-            None => push_varint(&mut body, rows_per_block as u64),
-        }
-        let flag = |given: bool, flag: u8| if given { flag } else { 0 };
-        let count = self.schema.columns.len();
-        let flags = flag(self.form == Form::Stream, STREAM)
-            | flag(self.origin != 0, ORIGIN)
-            | flag(count > 1, COLUMNS)
-            | flag(!self.schema.time_name.is_empty(), NAMED);
-        match self.schema.time {
-            TimeBase::Numbered => body.push(flags),
-            TimeBase::Clock {
-                decimals,
-                tolerance,
-                format,
-            } => {
-                body.push(match format {
-                    TimeFormat::Seconds => 1 | flags,
-                    TimeFormat::Utc => 2 | flags,
-                    TimeFormat::Local => 3 | flags,
-                });
-                body.push(decimals);
-                push_varint(&mut body, tolerance);
-                if flags & NAMED != 0 {
-                    push_text(&mut body, &self.schema.time_name);
-                }
-            }
-        }
-        if self.origin != 0 {
-            push_varint(&mut body, zigzag(self.origin));
-        }
-        if self.schema.time != TimeBase::Numbered {
-            push_varint(&mut body, zigzag(self.step));
-        }
-        if count > 1 {
-            push_varint(&mut body, count as u64);
-        }
-        let columns = self.schema.columns.iter().zip(&self.share_bounds).zip(&self.starts);
-        for ((column, share_bound), start) in columns {
-            push_column(&mut body, column, *share_bound, start.as_ref());
-        }
-        body
-    }
-
-    /// A recording of a single block with this content.
-    pub(crate) fn single(&self, content: &[u8]) -> Vec<u8> {
-        let mut bytes = self.to_bytes();
-        bytes.extend_from_slice(content);
-        let check = checksum(&[&bytes]);
-        bytes.extend(check.to_le_bytes());
-        bytes
-    }
 }
-
-/// Flags beside the time base: blocks over a link, which have no end; an origin follows; a number of columns follows (else one).
-pub(crate) const STREAM: u8 = 0x10;
-pub(crate) const ORIGIN: u8 = 0x20;
-pub(crate) const COLUMNS: u8 = 0x40;
-/// Flag beside the time base: the name of the times follows (else `time`).
-pub(crate) const NAMED: u8 = 0x80;
-/// Flag beside the version: the only block follows.
-pub(crate) const SINGLE: u8 = 0x80;
 
 /// Random bits from the standard library's keys for hash tables, which differ from call to call and from process to process. WebAssembly
 /// without a system has neither keys nor a clock: there they differ from call to call only.

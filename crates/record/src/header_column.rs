@@ -5,7 +5,7 @@ use crate::codec::{Target, adaptive};
 use crate::column::Column;
 use crate::error::{Damage, Error};
 use crate::integers::Integers;
-use crate::wire::{Bytes, push_text, push_varint, text, unzigzag, zigzag};
+use crate::wire::{Fields, short_bound};
 use fewbits_block_codec::Start;
 use std::f64::consts::TAU;
 
@@ -45,129 +45,84 @@ pub(crate) fn shortened(bound: f64) -> f64 {
     short.unwrap_or(bound)
 }
 
-/// Appends a non-negative number: decimals and digits if these are exact, otherwise its bits.
-fn push_number(body: &mut Vec<u8>, number: f64) {
-    match digits(number) {
-        Some((decimals, digits)) => {
-            body.push(decimals);
-            push_varint(body, digits);
-        }
-        None if number == TAU => body.push(TURN),
-        None => {
-            body.push(DOUBLE);
-            body.extend(number.to_le_bytes());
-        }
-    }
-}
-
-fn read_number(body: &mut Bytes<'_>) -> Result<f64, Damage> {
-    match body.byte()? {
-        DOUBLE => Ok(body.f64()?),
+/// A non-negative number: decimals and digits if these are exact, otherwise its bits.
+fn number<F: Fields>(fields: &mut F, own: f64) -> Result<f64, Damage> {
+    let (form, digits) = digits(own).unwrap_or((if own == TAU { TURN } else { DOUBLE }, 0));
+    match fields.byte(form)? {
+        DOUBLE => Ok(fields.f64(own)?),
         TURN => Ok(TAU),
         decimals => {
-            let ten = TENS
-                .get(usize::from(decimals))
-                .ok_or(Damage::Content("decimals of a number"))?;
-            Ok(body.varint()? as f64 / ten)
+            let ten = TENS.get(usize::from(decimals));
+            Ok(fields.varint(digits)? as f64 / ten.ok_or(Damage::Content("decimals of a number"))?)
         }
     }
 }
 
-pub(crate) fn push_column(body: &mut Vec<u8>, column: &Column, share_bound: f64, start: Option<&Start>) {
-    push_text(body, &column.name);
+/// The damage of a header with an argument that no writer accepts.
+pub(crate) fn refused(error: Error) -> Damage {
+    Damage::Content(error.argument().map_or("header", |argument| argument.name))
+}
+
+/// A column of a header, with the bound of a share and its start. A reader may be given any column.
+pub(crate) fn column<F: Fields>(
+    fields: &mut F,
+    own: &Column,
+    share_bound: f64,
+    start: Option<&Start>,
+) -> Result<(Column, f64, Option<Start>), Damage> {
+    let name = fields.text(&own.name)?;
     let flag = |given: bool, flag: u8| if given { flag } else { 0 };
-    let flags = flag(column.period.is_some(), HAS_PERIOD)
+    let flags = flag(own.period.is_some(), HAS_PERIOD)
         | flag(start.is_some(), HAS_START)
-        | flag(!column.unit.is_empty(), HAS_UNIT)
-        | flag(column.earlier > 0.0, HAS_EARLIER);
-    match column.bound {
-        Bound::Lossless => match column.integers {
-            None => body.push(flags),
-            Some(integers) => {
-                body.push(INTEGERS | flags);
-                push_varint(body, zigzag(integers.origin()));
-            }
-        },
-        Bound::Absolute(delta) => {
-            body.push(1 | flags);
-            push_number(body, delta);
-        }
-        Bound::ShareOfRange(share) => {
-            body.push(2 | flags);
-            push_number(body, share);
-            body.extend_from_slice(&share_bound.to_be_bytes()[..3]);
-        }
-        Bound::Decimals(places) => {
-            body.push(3 | flags);
-            body.push(places);
-        }
-        Bound::Relative { share, floor } => {
-            body.push(4 | flags);
-            push_number(body, share);
-            push_number(body, floor);
-        }
-    }
-    if !column.unit.is_empty() {
-        push_text(body, &column.unit);
-    }
-    if let Some(period) = column.period {
-        push_number(body, period);
-    }
-    if column.earlier > 0.0 {
-        push_number(body, column.earlier);
-    }
-    if let Some(start) = start {
-        body.extend(start.to_bytes());
-    }
-}
-
-pub(crate) fn read_column(body: &mut Bytes<'_>) -> Result<(Column, f64, Option<Start>), Error> {
-    let name = text(body).map_err(Error::header)?;
-    let kind = body.byte().map_err(Error::header)?;
-    let (mut share_bound, mut integers) = (0.0, None);
+        | flag(!own.unit.is_empty(), HAS_UNIT)
+        | flag(own.earlier > 0.0, HAS_EARLIER);
+    let (kind, size, floor, places) = match own.bound {
+        Bound::Lossless if own.integers.is_some() => (INTEGERS, 0.0, 0.0, 0),
+        Bound::Lossless => (0, 0.0, 0.0, 0),
+        Bound::Absolute(delta) => (1, delta, 0.0, 0),
+        Bound::ShareOfRange(share) => (2, share, 0.0, 0),
+        Bound::Decimals(places) => (3, 0.0, 0.0, places),
+        Bound::Relative { share, floor } => (4, share, floor, 0),
+    };
+    let kind = fields.byte(kind | flags)?;
+    let (mut integers, mut bound_of_share) = (None, 0.0);
     let bound = match kind & !(HAS_PERIOD | HAS_START | HAS_UNIT | HAS_EARLIER) {
         0 => Bound::Lossless,
         INTEGERS => {
-            integers = Some(Integers::from_origin(unzigzag(body.varint().map_err(Error::header)?)));
+            let origin = fields.signed(own.integers.map_or(0, Integers::origin))?;
+            integers = Some(Integers::from_origin(origin));
             Bound::Lossless
         }
-        1 => Bound::Absolute(read_number(body).map_err(Error::header)?),
+        1 => Bound::Absolute(number(fields, size)?),
         2 => {
-            let share = read_number(body).map_err(Error::header)?;
-            let [a, b, c] = body.array().map_err(Error::header)?;
-            share_bound = f64::from_be_bytes([a, b, c, 0, 0, 0, 0, 0]);
-            if !(share_bound >= 0.0 && (2.0 * share_bound).is_finite()) {
-                return Err(Error::Header(Damage::Content("bound of a share")));
-            }
+            let share = number(fields, size)?;
+            bound_of_share = short_bound(fields, share_bound)?;
             Bound::ShareOfRange(share)
         }
-        3 => Bound::Decimals(body.byte().map_err(Error::header)?),
+        3 => Bound::Decimals(fields.byte(places)?),
         4 => Bound::Relative {
-            share: read_number(body).map_err(Error::header)?,
-            floor: read_number(body).map_err(Error::header)?,
+            share: number(fields, size)?,
+            floor: number(fields, floor)?,
         },
-        _ => return Err(Error::Header(Damage::Content("bound"))),
+        _ => return Err(Damage::Content("bound")),
     };
-    let mut column = Column {
-        integers,
-        ..Column::new(name, bound)?
-    };
+    let mut column = Column::new(name, bound).map_err(refused)?;
+    column.integers = integers;
     if kind & HAS_UNIT != 0 {
-        column = column.with_unit(text(body).map_err(Error::header)?)?;
+        column = column.with_unit(fields.text(&own.unit)?).map_err(refused)?;
     }
     if kind & HAS_PERIOD != 0 {
-        column = column.with_period(read_number(body).map_err(Error::header)?)?;
+        let period = number(fields, own.period.unwrap_or(0.0))?;
+        column = column.with_period(period).map_err(refused)?;
     }
     if kind & HAS_EARLIER != 0 {
-        column = column.with_earlier_bound(read_number(body).map_err(Error::header)?)?;
+        let earlier = number(fields, own.earlier)?;
+        column = column.with_earlier_bound(earlier).map_err(refused)?;
     }
-    let mut start = None;
-    if kind & HAS_START != 0 {
-        let target = Target {
-            promise: column.promise(share_bound),
-            period: column.period,
-        };
-        start = Some(adaptive::read_start(&mut body.0, &target).map_err(Error::header)?);
-    }
-    Ok((column, share_bound, start))
+    let target = Target {
+        bound: column.bound_in(bound_of_share),
+        period: column.period,
+    };
+    let start = (kind & HAS_START != 0).then(|| adaptive::code_start(fields, start, &target));
+    Ok((column, bound_of_share, start.transpose()?))
 }

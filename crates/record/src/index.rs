@@ -8,8 +8,7 @@ use crate::aggregate::{self, Aggregate};
 use crate::block::Cells;
 use crate::error::Damage;
 use crate::header::{Header, VERSION_5};
-use crate::ranges::Ends;
-use crate::wire::{Bytes, checked, push_varint, read_checked, unzigzag, zigzag};
+use crate::wire::{Bytes, Fields, checked, read_checked, unzigzag, zigzag};
 
 /// Least number of rows per block with which the index has aggregates: those of a column take 25 bytes per block, of smaller blocks a larger part.
 const AGGREGATED_ROWS: usize = 4096;
@@ -32,24 +31,31 @@ pub(crate) const TRAILER_BYTES: usize = 8;
 /// Largest length of a footer in bytes.
 const MAX_FOOTER: usize = 1 << 22;
 
-/// Entry of one block.
+/// What the index says of one block.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Entry {
-    /// Length of the whole block in bytes.
-    pub(crate) length: u64,
-    /// Number of rows; 0 for damaged bytes.
-    pub(crate) rows: u64,
-    pub(crate) ticks: (i64, i64),
-    /// Lower and upper bound of the finite values of each column; `None` if there are none.
-    pub(crate) ends: Vec<Ends>,
-    /// Aggregates of each column, if the index has them.
-    pub(crate) aggregates: Option<Vec<Aggregate>>,
+#[non_exhaustive]
+pub struct BlockInfo {
+    /// Offset of the first byte.
+    pub offset: u64,
+    /// Length in bytes.
+    pub bytes: u64,
+    /// Number of rows.
+    pub rows: u64,
+    /// Smallest and largest tick.
+    pub ticks: (i64, i64),
+    /// Lower and upper bound of each column's values (they exceed them by at most a 15th of the column's range in 1024 blocks); `None`
+    /// without values.
+    pub ends: Vec<Option<(f64, f64)>>,
+    /// Aggregates of each column. The index has them if blocks have 4096 rows or more; then [`ends`](Self::ends) are exact.
+    pub aggregates: Option<Vec<Aggregate>>,
 }
 
-impl Entry {
-    pub(crate) fn damaged(length: u64, columns: usize) -> Self {
+impl BlockInfo {
+    /// So many damaged bytes, which have no rows.
+    pub(crate) fn damaged(offset: u64, bytes: u64, columns: usize) -> Self {
         Self {
-            length,
+            offset,
+            bytes,
             rows: 0,
             ticks: (0, 0),
             ends: vec![None; columns],
@@ -57,23 +63,31 @@ impl Entry {
         }
     }
 
-    pub(crate) fn of(length: u64, ticks: &[i64], columns: &[Cells]) -> Self {
+    pub(crate) fn of(offset: u64, bytes: u64, ticks: &[i64], columns: &[Cells]) -> Self {
         let aggregates = aggregate::of_columns(columns);
-        let ticks = ticks
-            .iter()
-            .fold((i64::MAX, i64::MIN), |(l, h), tick| (l.min(*tick), h.max(*tick)));
         Self {
-            length,
-            rows: columns.first().map_or(0, |cells| cells.len() as u64),
-            ticks,
+            offset,
+            bytes,
+            rows: ticks.len() as u64,
+            ticks: ends_of(ticks).unwrap_or((0, 0)),
             ends: aggregates.iter().map(Aggregate::ends).collect(),
             aggregates: Some(aggregates),
         }
     }
 }
 
+/// The smallest and the largest of pairs of these.
+pub(crate) fn ends(pairs: impl Iterator<Item = (i64, i64)>) -> Option<(i64, i64)> {
+    pairs.reduce(|(low, high), (first, last)| (low.min(first), high.max(last)))
+}
+
+/// The smallest and the largest tick.
+pub(crate) fn ends_of(ticks: &[i64]) -> Option<(i64, i64)> {
+    ends(ticks.iter().map(|tick| (*tick, *tick)))
+}
+
 /// Entry of one segment in the footer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Segment {
     /// Offset of its first block.
     pub(crate) start: u64,
@@ -86,19 +100,16 @@ pub(crate) struct Segment {
 }
 
 impl Segment {
-    pub(crate) fn new(start: u64, length: u64, entries: &[Entry]) -> Self {
-        let filled = || entries.iter().filter(|entry| entry.rows > 0);
+    /// Of these entries, of which there must be some.
+    pub(crate) fn new(length: u64, entries: &[BlockInfo]) -> Self {
+        let filled = entries.iter().filter(|entry| entry.rows > 0);
+        let sum = |of: fn(&BlockInfo) -> u64| entries.iter().map(of).fold(0, u64::saturating_add);
         Self {
-            start,
-            blocks: entries
-                .iter()
-                .fold(0, |sum: u64, entry| sum.saturating_add(entry.length)),
+            start: entries.first().map_or(0, |entry| entry.offset),
+            blocks: sum(|entry| entry.bytes),
             length,
-            rows: entries.iter().fold(0, |sum: u64, entry| sum.saturating_add(entry.rows)),
-            ticks: (
-                filled().map(|entry| entry.ticks.0).min().unwrap_or(0),
-                filled().map(|entry| entry.ticks.1).max().unwrap_or(0),
-            ),
+            rows: sum(|entry| entry.rows),
+            ticks: ends(filled.map(|entry| entry.ticks)).unwrap_or((0, 0)),
         }
     }
 
@@ -149,10 +160,7 @@ fn f32_below(value: f64) -> f32 {
     }
 }
 
-/// Bytes of a stored bound of a column: the first ones of a big-endian `f32`.
-const SHORT: usize = 3;
-
-/// The largest number of `SHORT` bytes that does not exceed `value`.
+/// The largest number of three bytes, the first ones of a big-endian `f32`, that does not exceed `value`.
 fn short_below(value: f64) -> f32 {
     let near = f32_below(value).to_bits();
     // Dropping the last byte makes a negative number larger.
@@ -168,8 +176,9 @@ fn short_above(value: f64) -> f32 {
     -short_below(-value)
 }
 
-fn read_short(reader: &mut Bytes<'_>) -> Result<f64, Damage> {
-    let [a, b, c] = reader.array()?;
+fn short<F: Fields>(fields: &mut F, own: f32) -> Result<f64, Damage> {
+    let [a, b, c, _] = own.to_be_bytes();
+    let [a, b, c] = fields.bytes([a, b, c])?;
     Ok(f64::from(f32::from_be_bytes([a, b, c, 0])))
 }
 
@@ -210,76 +219,45 @@ fn level_value(level: u8, ends: (f64, f64)) -> f64 {
     }
 }
 
-/// The content of a segment.
-pub(crate) fn push_segment(header: &Header, entries: &[Entry]) -> Vec<u8> {
+/// The fields of a segment of these entries, of which a reader has none. The first block is at `offset`.
+pub(crate) fn segment<F: Fields>(
+    fields: &mut F,
+    header: &Header,
+    mut offset: u64,
+    own: &[BlockInfo],
+) -> Result<Vec<BlockInfo>, Damage> {
     let columns = header.schema.columns.len();
-    let mut content = Vec::new();
-    push_varint(&mut content, entries.len() as u64);
+    let count = fields.count(own.len(), BLOCKS_PER_SEGMENT, "number of blocks")?;
     let is_aggregated = has_aggregates(header);
     let mut scales = Vec::with_capacity(columns);
     for column in 0..if is_aggregated { 0 } else { columns } {
-        let ends = entries.iter().filter_map(|entry| entry.ends[column]);
+        let ends = own.iter().filter_map(|entry| entry.ends[column]);
         let all = ends.reduce(|(l, h), (low, high)| (l.min(low), h.max(high)));
         // Without values the lower bound is stored above the upper one.
         let (low, high) = all.map_or((1.0, 0.0), |(low, high)| (short_below(low), short_above(high)));
-        content.extend_from_slice(&low.to_be_bytes()[..SHORT]);
-        content.extend_from_slice(&high.to_be_bytes()[..SHORT]);
-        scales.push((f64::from(low), f64::from(high)));
+        scales.push((short(fields, low)?, short(fields, high)?));
     }
-    let (mut last, mut before, mut length) = (header.origin, None, 0);
-    for entry in entries {
-        let distance = entry.ticks.0.wrapping_sub(last);
-        let shape = (entry.rows, distance, entry.ticks.1.wrapping_sub(entry.ticks.0));
-        let same = before == Some(shape);
-        // Blocks with equal numbers of rows have similar lengths: the difference mostly fits into a byte.
-        let longer = zigzag(entry.length.wrapping_sub(length) as i64);
-        push_varint(&mut content, longer << 1 | u64::from(same));
-        length = entry.length;
-        if !same {
-            push_varint(&mut content, entry.rows);
-        }
-        if entry.rows == 0 {
-            continue;
-        }
-        if !same {
-            push_varint(&mut content, zigzag(distance));
-            push_varint(&mut content, shape.2 as u64);
-        }
-        (last, before) = (entry.ticks.1, Some(shape));
-        let aggregates = entry.aggregates.iter().flatten().filter(|_| is_aggregated);
-        aggregates.for_each(|aggregate| aggregate.push(&mut content, entry.rows));
-        for (ends, scale) in entry.ends.iter().zip(&scales) {
-            let levels = ends.map(|(low, high)| [level_below(low, *scale), level_above(high, *scale)]);
-            let [low, high] = levels.unwrap_or(NO_VALUES);
-            content.push(low << 4 | high);
-        }
-    }
-    content
-}
-
-/// Reads what [`push_segment`] wrote.
-pub(crate) fn read_segment(header: &Header, content: &[u8]) -> Result<Vec<Entry>, Damage> {
-    let columns = header.schema.columns.len();
-    let mut reader = Bytes(content);
-    let count = reader.count(BLOCKS_PER_SEGMENT, "number of blocks")?;
-    let is_aggregated = has_aggregates(header);
-    let mut scales = Vec::with_capacity(columns);
-    for _ in 0..if is_aggregated { 0 } else { columns } {
-        scales.push((read_short(&mut reader)?, read_short(&mut reader)?));
-    }
+    let blank = BlockInfo::damaged(0, 0, columns);
     let (mut entries, mut last, mut before) = (Vec::with_capacity(count), header.origin, None);
     let mut length = 0_u64;
-    for _ in 0..count {
-        let head = reader.varint()?;
+    for i in 0..count {
+        let own = own.get(i).unwrap_or(&blank);
+        let (rows, ticks) = (own.rows, own.ticks);
+        let (distance, span) = (ticks.0.wrapping_sub(last), ticks.1.wrapping_sub(ticks.0));
+        let is_same = before == Some((rows, distance, span));
+        // Blocks with equal numbers of rows have similar lengths: the difference mostly fits into a byte.
+        let longer = zigzag(own.bytes.wrapping_sub(length) as i64);
+        let head = fields.varint(longer << 1 | u64::from(is_same))?;
         // Any lengths can stand here: `playback::entries` compares their sum with the footer.
         length = length.wrapping_add(unzigzag(head >> 1) as u64);
-        let mut entry = Entry::damaged(length, columns);
+        let mut entry = BlockInfo::damaged(offset, length, columns);
+        offset = offset.saturating_add(length);
         let shape = if head & 1 == 1 {
             before.ok_or(Damage::Content("block like the one before"))?
         } else {
-            match reader.varint()? {
+            match fields.varint(rows)? {
                 0 => (0, 0, 0),
-                rows => (rows, reader.signed()?, reader.varint()? as i64),
+                rows => (rows, fields.signed(distance)?, fields.varint(span as u64)? as i64),
             }
         };
         entry.rows = shape.0;
@@ -288,35 +266,46 @@ pub(crate) fn read_segment(header: &Header, content: &[u8]) -> Result<Vec<Entry>
             entry.ticks = (first, first.wrapping_add(shape.2));
             (last, before) = (entry.ticks.1, Some(shape));
             if is_aggregated {
-                let read = |_| Aggregate::read(&mut reader, entry.rows);
-                let aggregates: Vec<Aggregate> = (0..columns).map(read).collect::<Result<_, _>>()?;
+                let known = own.aggregates.as_deref().unwrap_or_default();
+                let code = |i| Aggregate::code(fields, known.get(i).copied().unwrap_or_default(), entry.rows);
+                let aggregates: Vec<Aggregate> = (0..columns).map(code).collect::<Result<_, _>>()?;
                 entry.ends = aggregates.iter().map(Aggregate::ends).collect();
                 entry.aggregates = Some(aggregates);
             }
-            for (ends, scale) in entry.ends.iter_mut().zip(&scales) {
-                let byte = reader.byte()?;
+            for ((ends, own), scale) in entry.ends.iter_mut().zip(&own.ends).zip(&scales) {
+                let levels = own.map(|(low, high)| [level_below(low, *scale), level_above(high, *scale)]);
+                let [low, high] = levels.unwrap_or(NO_VALUES);
+                let byte = fields.byte(low << 4 | high)?;
                 let (low, high) = (byte >> 4, byte & 15);
                 *ends = (low <= high).then(|| (level_value(low, *scale), level_value(high, *scale)));
             }
         }
         entries.push(entry);
     }
-    reader.finish()?;
     Ok(entries)
 }
 
-/// The footer.
-pub(crate) fn push_footer(header: &Header, segments: &[Segment]) -> Vec<u8> {
-    let mut content = Vec::new();
-    push_varint(&mut content, segments.len() as u64);
-    for segment in segments {
-        push_varint(&mut content, segment.blocks);
-        push_varint(&mut content, segment.length);
-        push_varint(&mut content, segment.rows);
-        push_varint(&mut content, zigzag(segment.ticks.0.wrapping_sub(header.origin)));
-        push_varint(&mut content, segment.ticks.1.wrapping_sub(segment.ticks.0) as u64);
+/// The fields of a footer of these segments, of which a reader has none.
+pub(crate) fn footer<F: Fields>(fields: &mut F, header: &Header, own: &[Segment]) -> Result<Vec<Segment>, Damage> {
+    let count = fields.count(own.len(), usize::MAX, "number of segments")?;
+    let (mut segments, mut start) = (Vec::new(), header.length as u64);
+    for i in 0..count {
+        let own = own.get(i).copied().unwrap_or_default();
+        let (blocks, length, rows) = (fields.varint(own.blocks)?, fields.varint(own.length)?, fields.varint(own.rows)?);
+        let distance = fields.signed(own.ticks.0.wrapping_sub(header.origin))?;
+        let first = header.origin.wrapping_add(distance);
+        let span = fields.varint(own.ticks.1.wrapping_sub(own.ticks.0) as u64)?;
+        let segment = Segment {
+            start,
+            blocks,
+            length,
+            rows,
+            ticks: (first, first.wrapping_add(span as i64)),
+        };
+        start = segment.end();
+        segments.push(segment);
     }
-    special(header.check, FOOTER, &content)
+    Ok(segments)
 }
 
 /// The last bytes of a recording, after its footer.
@@ -324,41 +313,21 @@ pub(crate) fn trailer(footer: u64) -> Vec<u8> {
     [&(footer as u32).to_le_bytes()[..], &END].concat()
 }
 
-/// Reads what [`push_footer`] wrote; the first block begins at `start`.
-pub(crate) fn read_footer(header: &Header, content: &[u8], start: u64) -> Result<Vec<Segment>, Damage> {
-    let mut reader = Bytes(content);
-    let count = reader.count(content.len(), "number of segments")?;
-    let (mut segments, mut start) = (Vec::new(), start);
-    for _ in 0..count {
-        let (blocks, length, rows) = (reader.varint()?, reader.varint()?, reader.varint()?);
-        let first = header.origin.wrapping_add(reader.signed()?);
-        let segment = Segment {
-            start,
-            blocks,
-            length,
-            rows,
-            ticks: (first, first.wrapping_add(reader.varint()? as i64)),
-        };
-        start = segment.end();
-        segments.push(segment);
-    }
-    reader.finish()?;
-    Ok(segments)
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::wire::{read, written};
     use crate::{Bound, Column, Schema, TimeBase};
 
     #[test]
     fn ends_are_outside_the_values() {
         let values = [(-3.7, 12.25), (0.1, 0.3), (1e-9, 1e300), (-1e308, 1.6e308), (5.0, 5.0)];
-        let entries: Vec<Entry> = values
+        let entries: Vec<BlockInfo> = values
             .iter()
-            .map(|ends| Entry {
-                length: 9,
+            .map(|ends| BlockInfo {
+                offset: 0,
+                bytes: 9,
                 rows: 4,
                 ticks: (-5, 7),
                 ends: vec![Some(*ends), None, Some((0.3, 0.3))],
@@ -369,7 +338,8 @@ mod tests {
         let schema = Schema::new(columns.to_vec(), TimeBase::Numbered).unwrap();
         let schema = schema.with_rows_per_block(512).unwrap();
         let header = Header::new(schema, &[3], vec![0.0; 3]);
-        let read = read_segment(&header, &push_segment(&header, &entries)).unwrap();
+        let bytes = written(|fields| segment(fields, &header, 0, &entries));
+        let read = read(&bytes, |fields| segment(fields, &header, 0, &[])).unwrap();
         for (entry, (low, high)) in read.iter().zip(values) {
             let (l, h) = entry.ends[0].unwrap();
             assert!(l <= low && h >= high, "{l} {low} {high} {h}");

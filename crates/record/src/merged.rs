@@ -7,6 +7,7 @@ use crate::integers::Integers;
 use crate::playback::{Playback, Row};
 use crate::schema::{Schema, TimeBase};
 use fewbits_block_codec::ArgumentError;
+use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 
 /// Rows of one recording.
@@ -14,17 +15,14 @@ struct Source<'a, R> {
     rows: Rows<'a, R>,
     /// Codes of whole numbers, of this recording and of the first, by their place in a row.
     codes: Vec<(usize, Integers, Integers)>,
-    /// No row has an earlier tick, if it is known.
-    first: i64,
     next: Option<Row>,
 }
 
 /// Iterator over the rows of several recordings ([`merged`]).
 pub struct Merged<'a, R> {
-    /// Those that have rows at the present tick, by their place among all.
-    open: Vec<(usize, Source<'a, R>)>,
-    /// Those that begin later, the next one last.
-    later: Vec<(usize, Source<'a, R>)>,
+    /// By the tick of the next row, or as long as that is not read of the last one (if none is, a tick that no row is before), and the place
+    /// among all.
+    sources: BTreeMap<(i64, usize), Source<'a, R>>,
 }
 
 fn names(schema: &Schema) -> Vec<&str> {
@@ -101,28 +99,16 @@ pub fn merged<'a, R: Read + Seek>(
             }
         }
     }
-    let mut later = Vec::with_capacity(playbacks.len());
+    let mut sources = BTreeMap::new();
     for (i, playback) in playbacks.iter_mut().enumerate() {
         playback.columns(wanted)?;
         // Without an index the first tick is not known: such a recording is open from the beginning.
         let begin = playback.ticks()?.map_or(i64::MIN, |ticks| ticks.0.max(from));
         let codes = codes(playback.schema(), first.as_ref(), wanted)?;
-        let rows = playback.range(from, to);
-        later.push((
-            i,
-            Source {
-                rows,
-                codes,
-                first: begin,
-                next: None,
-            },
-        ));
+        let (rows, next) = (playback.range(from, to), None);
+        sources.insert((begin, i), Source { rows, codes, next });
     }
-    later.sort_by_key(|(i, source)| std::cmp::Reverse((source.first, *i)));
-    Ok(Merged {
-        open: Vec::new(),
-        later,
-    })
+    Ok(Merged { sources })
 }
 
 impl<R: Read + Seek> Iterator for Merged<'_, R> {
@@ -130,30 +116,24 @@ impl<R: Read + Seek> Iterator for Merged<'_, R> {
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
-            // Each open recording has its next row, or is closed.
-            let mut i = 0;
-            while let Some((_, source)) = self.open.get_mut(i) {
-                if source.next.is_some() {
-                    i += 1;
-                    continue;
-                }
-                match source.rows.next() {
-                    Some(Ok(row)) => source.next = Some(recoded(row, &source.codes)),
-                    Some(Err(error)) => return Some(Err(error)),
-                    None => drop(self.open.remove(i)),
-                }
+            let ((tick, place), mut source) = self.sources.pop_first()?;
+            let (tick, item) = match source.next.take() {
+                Some(row) => (tick, Some(Ok(row))),
+                None => match source.rows.next() {
+                    Some(Ok(row)) => {
+                        let tick = row.tick;
+                        source.next = Some(recoded(row, &source.codes));
+                        (tick, None)
+                    }
+                    Some(Err(error)) => (tick, Some(Err(error))),
+                    // The recording is closed.
+                    None => continue,
+                },
+            };
+            self.sources.insert((tick, place), source);
+            if item.is_some() {
+                return item;
             }
-            let key = |(place, source): &(usize, Source<'_, R>)| source.next.as_ref().map(|row| (row.tick, *place));
-            let earliest = self.open.iter().filter_map(key).min();
-            let next = self.later.last().map(|(_, source)| source.first);
-            let is_due = next.is_some_and(|first| earliest.is_none_or(|(tick, _)| first <= tick));
-            if is_due && let Some(source) = self.later.pop() {
-                self.open.push(source);
-                continue;
-            }
-            let (_, place) = earliest?;
-            let source = self.open.iter_mut().find(|(other, _)| *other == place);
-            return source.and_then(|(_, source)| source.next.take()).map(Ok);
         }
     }
 }

@@ -1,13 +1,13 @@
 //! Reading of recordings with random access.
 
-use crate::aggregate::Aggregate;
 use crate::append;
 use crate::block::{self, Block};
 use crate::error::{Damage, Error};
 use crate::header::Header;
-use crate::index::{self, END, Entry, Segment, TRAILER_BYTES};
+use crate::index::{self, BlockInfo, END, Segment, TRAILER_BYTES};
 use crate::scan::Scanner;
 use crate::schema::Schema;
+use crate::wire::read;
 use std::fs::File;
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -20,38 +20,6 @@ pub struct Row {
     pub tick: i64,
     /// One cell per requested column, in the order of the request; `None` is a gap.
     pub values: Vec<Option<f64>>,
-}
-
-/// What the index says of one block.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub struct BlockInfo {
-    /// Offset of the first byte.
-    pub offset: u64,
-    /// Length in bytes.
-    pub bytes: u64,
-    /// Number of rows.
-    pub rows: u64,
-    /// Smallest and largest tick.
-    pub ticks: (i64, i64),
-    /// Lower and upper bound of each column's values (they exceed them by at most a 15th of the column's range in 1024 blocks); `None`
-    /// without values.
-    pub ends: Vec<Option<(f64, f64)>>,
-    /// Aggregates of each column. The index has them if blocks have 4096 rows or more; then [`ends`](Self::ends) are exact.
-    pub aggregates: Option<Vec<Aggregate>>,
-}
-
-impl BlockInfo {
-    fn of(entry: Entry, offset: u64) -> Self {
-        Self {
-            offset,
-            bytes: entry.length,
-            rows: entry.rows,
-            ticks: entry.ticks,
-            ends: entry.ends,
-            aggregates: entry.aggregates,
-        }
-    }
 }
 
 /// Reads a recording by its index, or from front to end if it has none.
@@ -153,23 +121,20 @@ impl<R: Read + Seek> Playback<R> {
     /// # Errors
     /// If the only block is damaged.
     pub fn ticks(&self) -> Result<Option<(i64, i64)>, Error> {
-        let widened = |ends: Option<(i64, i64)>, (first, last): (i64, i64)| {
-            Some(ends.map_or((first, last), |(low, high)| (low.min(first), high.max(last))))
-        };
-        if let Some(content) = &self.single {
-            let block = self.only(content, |_| false)?;
-            return Ok(block.ticks.iter().map(|tick| (*tick, *tick)).fold(None, widened));
+        if let Some(block) = self.only(|_| false) {
+            return Ok(index::ends_of(&block?.ticks));
         }
         let Index::Whole(segments) = &self.index else {
             return Ok(None);
         };
         let filled = segments.iter().filter(|segment| segment.rows > 0);
-        Ok(filled.map(|segment| segment.ticks).fold(None, widened))
+        Ok(index::ends(filled.map(|segment| segment.ticks)))
     }
 
-    /// The only block, with this content.
-    pub(crate) fn only(&self, content: &[u8], wanted: impl Fn(usize) -> bool) -> Result<Block, Error> {
-        block::only(&self.header, content, self.span.1, wanted)
+    /// The only block, if there is one.
+    pub(crate) fn only(&self, wanted: impl Fn(usize) -> bool) -> Option<Result<Block, Error>> {
+        let content = self.single.as_deref()?;
+        Some(block::only(&self.header, content, self.span.1, wanted))
     }
 
     /// Length of the whole recording in bytes.
@@ -195,30 +160,19 @@ impl<R: Read + Seek> Playback<R> {
     /// If reading fails or a part of the index is damaged.
     pub fn index(&mut self) -> Result<Vec<BlockInfo>, Error> {
         let mut infos = Vec::new();
-        if let Some(content) = &self.single {
-            let length = content.len() as u64;
-            let block = self.only(content, |_| true)?;
-            let entry = Entry::of(length, &block.ticks, &block.columns);
+        if let Some(block) = self.only(|_| true) {
+            let (block, length) = (block?, self.single.as_ref().map_or(0, Vec::len) as u64);
             // The checksum of the whole recording follows the content.
-            infos.push(BlockInfo::of(entry, self.span.1.saturating_sub(length + 4)));
+            let offset = self.span.1.saturating_sub(length + 4);
+            infos.push(BlockInfo::of(offset, length, &block.ticks, &block.columns));
         }
-        let Index::Whole(segments) = self.index.clone() else {
+        let Index::Whole(segments) = &self.index else {
             return Ok(infos);
         };
         for segment in segments {
-            let Some(found) = entries(&mut self.reader, &self.header, &segment)? else {
-                return Err(Error::Block {
-                    offset: segment.start + segment.blocks,
-                    bytes: segment.length,
-                    damage: Damage::Checksum,
-                });
-            };
-            let mut offset = segment.start;
-            for entry in found {
-                let next = offset.saturating_add(entry.length);
-                infos.push(BlockInfo::of(entry, offset));
-                offset = next;
-            }
+            let found = entries(&mut self.reader, &self.header, segment)?;
+            let damaged = || Error::block(segment.start + segment.blocks, segment.length, Damage::Checksum);
+            infos.extend(found.ok_or_else(damaged)?);
         }
         Ok(infos)
     }
@@ -262,11 +216,11 @@ pub(crate) fn index_of(reader: &mut (impl Read + Seek), header: &Header) -> Resu
     let first = header.length as u64;
     let (found, expected) = match index::read_special(header, &bytes) {
         Ok((index::FOOTER, content, whole)) if whole as u64 == length => {
-            (index::read_footer(header, content, first), start)
+            (read(content, |fields| index::footer(fields, header, &[])), start)
         }
         Ok((index::ONLY, content, whole)) if whole as u64 == length => {
-            let entries = index::read_segment(header, content);
-            (entries.map(|entries| vec![Segment::new(first, length, &entries)]), trailer)
+            let entries = read(content, |fields| index::segment(fields, header, first, &[]));
+            (entries.map(|entries| vec![Segment::new(length, &entries)]), trailer)
         }
         _ => return Ok(without),
     };
@@ -280,19 +234,20 @@ pub(crate) fn entries(
     reader: &mut (impl Read + Seek),
     header: &Header,
     segment: &Segment,
-) -> Result<Option<Vec<Entry>>, Error> {
+) -> Result<Option<Vec<BlockInfo>>, Error> {
     let offset = segment.start.saturating_add(segment.blocks);
     let Some(bytes) = read_at(reader, offset, segment.length)? else {
         return Ok(None);
     };
     let found = match index::read_special(header, &bytes) {
-        Ok((index::SEGMENT | index::ONLY, content, _)) => index::read_segment(header, content).ok(),
+        Ok((index::SEGMENT | index::ONLY, content, _)) => {
+            read(content, |fields| index::segment(fields, header, segment.start, &[])).ok()
+        }
         _ => None,
     };
-    let total = |entries: &Vec<Entry>| {
-        entries
-            .iter()
-            .try_fold(0_u64, |sum, entry| sum.checked_add(entry.length))
+    let total = |entries: &Vec<BlockInfo>| {
+        let mut lengths = entries.iter().map(|entry| entry.bytes);
+        lengths.try_fold(0_u64, |sum, length| sum.checked_add(length))
     };
     Ok(found.filter(|entries| total(entries) == Some(segment.blocks)))
 }

@@ -2,14 +2,14 @@
 
 use crate::append::{self, Append};
 use crate::block::{self, Block};
-use crate::error::{Damage, Error};
+use crate::error::Error;
 use crate::header::{Form, Header};
-use crate::index::{self, BLOCKS_PER_SEGMENT, Entry, Segment};
+use crate::index::{self, BLOCKS_PER_SEGMENT, BlockInfo, Segment};
 use crate::resume::{self, Opened};
 use crate::scan::{Kind, Scanner};
 use crate::schema::Schema;
 use crate::waiting::Waiting;
-use crate::wire::checked;
+use crate::wire::{checked, written};
 use fewbits_block_codec::Effort;
 use std::fs::File;
 use std::io::Write;
@@ -17,13 +17,6 @@ use std::path::Path;
 
 /// Largest number of rows of a single block for which a code that its columns share is tried.
 const SHARED_ROWS: usize = 1 << 13;
-
-/// Whether a new header contains starts of the columns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Starts {
-    None,
-    Learned,
-}
 
 /// Writes rows in blocks.
 ///
@@ -40,9 +33,7 @@ pub struct Recorder<W> {
     next_tick: i64,
     /// Number of bytes written.
     offset: u64,
-    /// Offset of the first block of the present segment.
-    segment_start: u64,
-    entries: Vec<Entry>,
+    entries: Vec<BlockInfo>,
     segments: Vec<Segment>,
     /// Number of the next block.
     next_number: u64,
@@ -83,12 +74,10 @@ impl Recorder<File> {
             Opened::Other(file, header, single, scanner) => return Self::copied(file, path, &header, single, scanner),
         };
         let schema = resumed.header.schema.clone();
-        let first = resumed.header.length as u64;
         Ok(Self {
             header: Some(resumed.header),
-            next_tick: resumed.next_tick,
+            next_tick: resume::next_tick(&resumed.segments, &resumed.entries),
             offset: resumed.offset,
-            segment_start: resumed.segments.last().map_or(first, Segment::end),
             segments: resumed.segments,
             entries: resumed.entries,
             next_number: resumed.next_number,
@@ -114,14 +103,15 @@ impl Recorder<File> {
         copy.put_header(old.clone().with_form(Form::File).renewed())?;
         if let Some(content) = single {
             let block = block::only(old, &content, content.len() as u64, |_| true)?;
-            copy.put_again(old, &content, &block).map_err(Error::header)??;
+            let content = block::renewed(old, &content, 0).map_err(Error::Header)?;
+            copy.put_again(&content, &block)?;
         }
         while let Some(found) = scanner.next(&mut reader, old)? {
             if found.kind == Kind::Block {
                 let block = scanner.decoded(old, &found, |_| true)?;
                 let content = block::content_of(scanner.bytes(&found));
-                let put = content.and_then(|content| copy.put_again(old, content, &block));
-                put.map_err(|damage| found.damaged(damage))??;
+                let content = content.and_then(|content| block::renewed(old, content, copy.next_number));
+                copy.put_again(&content.map_err(|damage| found.damaged(damage))?, &block)?;
             }
         }
         copy.next_tick = resume::next_tick(&copy.segments, &copy.entries);
@@ -148,7 +138,6 @@ impl<W: Write> Recorder<W> {
             header: None,
             next_tick: 0,
             offset: 0,
-            segment_start: 0,
             entries: Vec::new(),
             segments: Vec::new(),
             next_number: 0,
@@ -202,12 +191,12 @@ impl<W: Write> Recorder<W> {
         let rows_per_block = self.schema.rows_per_block;
         // The first block waits for one row more: if none follows, the recording is a single block, which takes fewer bytes.
         if self.rows.ticks.len() == rows_per_block && row.len() == self.rows.columns.len() {
-            self.write_block(Starts::Learned)?;
+            self.write_block()?;
         }
         self.rows.push(tick, row)?;
         self.next_tick = tick.wrapping_add(1);
         if self.rows.ticks.len() == rows_per_block && self.header.is_some() {
-            self.write_block(Starts::Learned)?;
+            self.write_block()?;
         }
         Ok(())
     }
@@ -229,7 +218,7 @@ impl<W: Write> Recorder<W> {
             return Err(Error::Broken);
         }
         if !self.rows.ticks.is_empty() {
-            self.write_block(Starts::Learned)?;
+            self.write_block()?;
         }
         self.writer.flush().map_err(Error::io("write"))?;
         self.append.commit()
@@ -250,14 +239,17 @@ impl<W: Write> Recorder<W> {
             return Ok(self.writer);
         }
         if !self.rows.ticks.is_empty() {
-            self.write_block(Starts::None)?;
+            self.write_block()?;
         }
-        self.write_header(Starts::None)?;
+        self.write_header()?;
         // A single segment is also the footer.
         let is_only = self.segments.is_empty() && !self.entries.is_empty();
         self.write_segment(if is_only { index::ONLY } else { index::SEGMENT })?;
         let footer = match &self.header {
-            Some(header) if !is_only => index::push_footer(header, &self.segments),
+            Some(header) if !is_only => {
+                let content = written(|fields| index::footer(fields, header, &self.segments));
+                index::special(header.check, index::FOOTER, &content)
+            }
             _ => Vec::new(),
         };
         let length = if is_only {
@@ -273,16 +265,12 @@ impl<W: Write> Recorder<W> {
 
     /// The whole recording of the waiting rows as a single block.
     fn single(&self) -> Vec<u8> {
-        let Waiting { ticks, columns, ranges } = &self.rows;
-        let plain = self.rows.header(&self.schema).of_single(ticks.len());
-        let own = ranges.own_bounds(&plain);
-        let written = |header: &Header| {
-            let (content, _) = block::content(header, 0, ticks, columns, &own, self.effort);
-            header.single(&content)
-        };
+        let (columns, rows) = (&self.rows.columns, self.rows.ticks.len());
+        let plain = self.rows.header(&self.schema).with_form(Form::Single(rows));
+        let written = |header: &Header| header.single(&self.rows.first(rows, header, 0, self.effort).content().0);
         let apart = written(&plain);
         // Columns with starts share one code. It is shorter if they have few rows or help each other.
-        let is_worth_it = columns.len() > 1 && ticks.len() <= SHARED_ROWS && self.effort == Effort::Thorough;
+        let is_worth_it = columns.len() > 1 && rows <= SHARED_ROWS && self.effort == Effort::Thorough;
         let shared = is_worth_it.then(|| written(&plain.with_starts(columns)));
         match shared {
             Some(shared) if shared.len() < apart.len() => shared,
@@ -301,7 +289,7 @@ impl<W: Write> Recorder<W> {
         Ok(())
     }
 
-    fn write_header(&mut self, starts: Starts) -> Result<(), Error> {
+    fn write_header(&mut self) -> Result<(), Error> {
         if self.header.is_some() {
             return Ok(());
         }
@@ -309,30 +297,25 @@ impl<W: Write> Recorder<W> {
         if let Some(identity) = self.identity {
             header = header.with_identity(identity);
         }
-        if starts == Starts::Learned {
-            header = header.with_starts(&self.rows.columns);
-        }
-        self.put_header(header)
+        self.put_header(header.with_starts(&self.rows.columns))
     }
 
     fn put_header(&mut self, header: Header) -> Result<(), Error> {
         self.write(&header.to_bytes())?;
-        self.segment_start = self.offset;
         self.header = Some(header);
         Ok(())
     }
 
-    /// Puts a block of another header, of this content, behind the others.
-    fn put_again(&mut self, old: &Header, content: &[u8], block: &Block) -> Result<Result<(), Error>, Damage> {
-        let content = block::renewed(old, content, self.next_number)?;
+    /// Puts a block of this content, which another recording had, behind the others.
+    fn put_again(&mut self, content: &[u8], block: &Block) -> Result<(), Error> {
         let check = self.header.as_ref().map_or(0, |header| header.check);
-        let bytes = checked(check, &[], &content);
-        let entry = Entry::of(bytes.len() as u64, &block.ticks, &block.columns);
-        Ok(self.put(&bytes, entry))
+        let bytes = checked(check, &[], content);
+        let entry = BlockInfo::of(self.offset, bytes.len() as u64, &block.ticks, &block.columns);
+        self.put(&bytes, entry)
     }
 
     /// Puts a block behind the others, and a segment of the index if it is full.
-    fn put(&mut self, bytes: &[u8], entry: Entry) -> Result<(), Error> {
+    fn put(&mut self, bytes: &[u8], entry: BlockInfo) -> Result<(), Error> {
         self.write(bytes)?;
         self.entries.push(entry);
         self.next_number += 1;
@@ -342,18 +325,17 @@ impl<W: Write> Recorder<W> {
         Ok(())
     }
 
-    fn write_block(&mut self, starts: Starts) -> Result<(), Error> {
-        self.write_header(starts)?;
+    fn write_block(&mut self) -> Result<(), Error> {
+        self.write_header()?;
         let Some(header) = &self.header else {
             return Err(Error::Broken);
         };
-        let Waiting { ticks, columns, ranges } = &self.rows;
-        let own = ranges.own_bounds(header);
-        let (bytes, restored) = block::encode(header, self.next_number, ticks, columns, &own, self.effort);
+        let rows = self.rows.ticks.len();
+        let (bytes, restored) = self.rows.first(rows, header, self.next_number, self.effort).block();
         // The index has the ends of what a reader gets, which may lie outside those of the samples.
-        let entry = Entry::of(bytes.len() as u64, ticks, &restored);
+        let entry = BlockInfo::of(self.offset, bytes.len() as u64, &self.rows.ticks, &restored);
         self.put(&bytes, entry)?;
-        self.rows.remove(self.rows.ticks.len());
+        self.rows.remove(rows);
         Ok(())
     }
 
@@ -364,12 +346,10 @@ impl<W: Write> Recorder<W> {
         let Some(header) = &self.header else {
             return Err(Error::Broken);
         };
-        let content = index::push_segment(header, &self.entries);
+        let content = written(|fields| index::segment(fields, header, 0, &self.entries));
         let bytes = index::special(header.check, kind, &content);
         self.write(&bytes)?;
-        let segment = Segment::new(self.segment_start, bytes.len() as u64, &self.entries);
-        self.segment_start = segment.end();
-        self.segments.push(segment);
+        self.segments.push(Segment::new(bytes.len() as u64, &self.entries));
         self.entries.clear();
         Ok(())
     }

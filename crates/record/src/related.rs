@@ -2,6 +2,7 @@
 
 use crate::block::Cells;
 use crate::codec::JOINT_COLUMNS;
+use fewbits_block_codec::Effort;
 
 /// Number of columns that are considered: the nearest ones before.
 const MAX_LOOKED_AT: usize = 32;
@@ -12,7 +13,10 @@ const MIN_CORRELATION: f64 = 0.3;
 const MIN_STEPS: f64 = 16.0;
 
 /// The earlier columns whose steps from row to row are correlated with this column's, by decreasing correlation.
-pub(crate) fn columns(cells: &[Option<f64>], before: &[Cells]) -> Vec<usize> {
+pub(crate) fn columns(cells: &[Option<f64>], before: &[Cells], effort: Effort) -> Vec<usize> {
+    if effort != Effort::Thorough {
+        return Vec::new();
+    }
     let nearest = before.iter().enumerate().rev().take(MAX_LOOKED_AT);
     let mut found: Vec<(usize, f64)> = nearest
         .map(|(i, other)| (i, correlation(cells, other).abs()))

@@ -4,9 +4,10 @@ use crate::append::{self, Append};
 use crate::block;
 use crate::error::Error;
 use crate::header::{Header, VERSION_5};
-use crate::index::{self, BLOCKS_PER_SEGMENT, Entry, Segment};
+use crate::index::{self, BLOCKS_PER_SEGMENT, BlockInfo, Segment};
 use crate::playback::{self, Index};
 use crate::scan::{Kind, Scanner};
+use crate::wire::read;
 use std::fs::File;
 use std::io::{Seek, SeekFrom};
 use std::path::Path;
@@ -16,8 +17,7 @@ pub(crate) struct Resumed {
     pub(crate) header: Header,
     pub(crate) offset: u64,
     pub(crate) segments: Vec<Segment>,
-    pub(crate) entries: Vec<Entry>,
-    pub(crate) next_tick: i64,
+    pub(crate) entries: Vec<BlockInfo>,
     pub(crate) next_number: u64,
 }
 
@@ -95,16 +95,11 @@ pub(crate) fn copy(locked: File, path: &Path) -> Result<(File, Append), Error> {
 }
 
 /// The tick behind all rows.
-pub(crate) fn next_tick(segments: &[Segment], entries: &[Entry]) -> i64 {
-    let of_entries = entries.iter().filter(|entry| entry.rows > 0).map(|entry| entry.ticks.1);
-    let of_segments = segments
-        .iter()
-        .filter(|segment| segment.rows > 0)
-        .map(|segment| segment.ticks.1);
-    of_segments
-        .chain(of_entries)
-        .max()
-        .map_or(0, |tick| tick.wrapping_add(1))
+pub(crate) fn next_tick(segments: &[Segment], entries: &[BlockInfo]) -> i64 {
+    let of_entries = entries.iter().filter(|entry| entry.rows > 0).map(|entry| entry.ticks);
+    let filled = segments.iter().filter(|segment| segment.rows > 0);
+    let ends = index::ends(filled.map(|segment| segment.ticks).chain(of_entries));
+    ends.map_or(0, |(_, last)| last.wrapping_add(1))
 }
 
 /// The state from footer and last segment; `None` if the last segment or block is damaged.
@@ -116,7 +111,7 @@ fn from_index(file: &mut File, header: &Header, mut segments: Vec<Segment>) -> R
         let Some(found) = playback::entries(file, header, &last)? else {
             return Ok(None);
         };
-        let Some(number) = last_number(file, header, last.start, &found)? else {
+        let Some(number) = last_number(file, header, &found)? else {
             return Ok(None);
         };
         next_number = number + 1;
@@ -130,7 +125,6 @@ fn from_index(file: &mut File, header: &Header, mut segments: Vec<Segment>) -> R
     Ok(Some(Resumed {
         header: header.clone(),
         offset,
-        next_tick: next_tick(&segments, &entries),
         next_number,
         segments,
         entries,
@@ -138,12 +132,11 @@ fn from_index(file: &mut File, header: &Header, mut segments: Vec<Segment>) -> R
 }
 
 /// The number of the last block of a segment; 0 in version 5. `None` if it cannot be read.
-fn last_number(file: &mut File, header: &Header, start: u64, entries: &[Entry]) -> Result<Option<u64>, Error> {
-    let Some(last) = entries.iter().rposition(|entry| entry.rows > 0) else {
+fn last_number(file: &mut File, header: &Header, entries: &[BlockInfo]) -> Result<Option<u64>, Error> {
+    let Some(last) = entries.iter().rfind(|entry| entry.rows > 0) else {
         return Ok(None);
     };
-    let offset = start + entries[..last].iter().map(|entry| entry.length).sum::<u64>();
-    let Some(bytes) = playback::read_at(file, offset, entries[last].length)? else {
+    let Some(bytes) = playback::read_at(file, last.offset, last.bytes)? else {
         return Ok(None);
     };
     let block = block::length(header, &bytes).and_then(|_| block::decode(header, &bytes, |_| false));
@@ -156,8 +149,8 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
     let mut scanner = Scanner::default();
     scanner.header(file)?;
     let columns = header.schema.columns.len();
-    let (mut offset, mut segment_start) = (scanner.consumed(), scanner.consumed());
-    let (mut entries, mut segments): (Vec<Entry>, Vec<Segment>) = (Vec::new(), Vec::new());
+    let mut offset = scanner.consumed();
+    let (mut entries, mut segments): (Vec<BlockInfo>, Vec<Segment>) = (Vec::new(), Vec::new());
     let mut next_number = 0;
     loop {
         let found = match scanner.next(file, &header) {
@@ -168,30 +161,28 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
         };
         // Skipped bytes stay in the file, so they need an entry: offsets of blocks are sums of lengths.
         if found.offset > offset {
-            entries.push(Entry::damaged(found.offset - offset, columns));
+            entries.push(BlockInfo::damaged(offset, found.offset - offset, columns));
         }
+        let damaged = || BlockInfo::damaged(found.offset, found.length as u64, columns);
         offset = found.offset + found.length as u64;
         match found.kind {
             Kind::Block => entries.push(match scanner.decoded(&header, &found, |_| true) {
                 // A block out of its place is not read.
                 Ok(block) if block.number.is_none_or(|number| number >= next_number) => {
                     next_number = block.number.map_or(0, |number| number + 1);
-                    Entry::of(found.length as u64, &block.ticks, &block.columns)
+                    BlockInfo::of(found.offset, found.length as u64, &block.ticks, &block.columns)
                 }
-                _ => Entry::damaged(found.length as u64, columns),
+                _ => damaged(),
             }),
             Kind::Segment if index_agrees(&header, scanner.bytes(&found), &entries) => {
-                let segment = Segment::new(segment_start, found.length as u64, &entries);
-                segment_start = segment.end();
-                segments.push(segment);
+                segments.push(Segment::new(found.length as u64, &entries));
                 entries.clear();
             }
             // A footer, or a segment some of whose blocks were damaged later: its bytes stay and are skipped.
-            Kind::Segment | Kind::Footer => entries.push(Entry::damaged(found.length as u64, columns)),
+            Kind::Segment | Kind::Footer => entries.push(damaged()),
         }
     }
     Ok(Resumed {
-        next_tick: next_tick(&segments, &entries),
         next_number,
         header,
         offset,
@@ -200,13 +191,9 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
     })
 }
 
-fn index_agrees(header: &Header, bytes: &[u8], entries: &[Entry]) -> bool {
-    let read = index::read_special(header, bytes).and_then(|(_, content, _)| index::read_segment(header, content));
-    read.is_ok_and(|read| {
-        read.len() == entries.len()
-            && read
-                .iter()
-                .zip(entries)
-                .all(|(a, b)| (a.length, a.rows) == (b.length, b.rows))
-    })
+fn index_agrees(header: &Header, bytes: &[u8], entries: &[BlockInfo]) -> bool {
+    let content = index::read_special(header, bytes);
+    let read = content.and_then(|(_, content, _)| read(content, |fields| index::segment(fields, header, 0, &[])));
+    let sizes = |entries: &[BlockInfo]| -> Vec<_> { entries.iter().map(|entry| (entry.bytes, entry.rows)).collect() };
+    !entries.is_empty() && read.is_ok_and(|read| sizes(&read) == sizes(entries))
 }

@@ -3,7 +3,7 @@
 use crate::block::{self, Block};
 use crate::error::{Damage, Error};
 use crate::header::{Header, MAX_HEADER};
-use crate::header_read::Known;
+use crate::header_bytes::Known;
 use crate::index::{self, TRAILER_BYTES};
 use crate::rolling::Prefixes;
 use crate::schema::{MAX_CELLS, Schema};
@@ -35,11 +35,7 @@ pub(crate) struct Found {
 impl Found {
     /// Damage of this record.
     pub(crate) fn damaged(&self, damage: Damage) -> Error {
-        Error::Block {
-            offset: self.offset,
-            bytes: self.length as u64,
-            damage,
-        }
+        Error::block(self.offset, self.length as u64, damage)
     }
 }
 
@@ -57,8 +53,6 @@ pub(crate) struct Scanner {
     pending: Option<Found>,
     /// The order of blocks.
     order: Order,
-    /// A block whose missing neighbours were reported first.
-    misses_others: Option<Block>,
     /// Whether the last record found is the end of a recording.
     has_end: bool,
     /// Checksums of the buffer's prefixes, while a record is searched for.
@@ -221,20 +215,12 @@ impl Scanner {
                     let Some(damage) = first else { return Ok(Some(found)) };
                     // The damage is reported first, and the record after it by the next call.
                     self.pending = Some(found);
-                    return Err(Error::Block {
-                        offset: start,
-                        bytes: found.offset - start,
-                        damage,
-                    });
+                    return Err(Error::block(start, found.offset - start, damage));
                 }
                 Err(Damage::CutOff) if !self.ended => self.fill(reader)?,
                 Err(_) if self.position == self.buffer.len() => {
                     let Some(damage) = first else { return Ok(None) };
-                    return Err(Error::Block {
-                        offset: start,
-                        bytes: self.consumed() - start,
-                        damage,
-                    });
+                    return Err(Error::block(start, self.consumed() - start, damage));
                 }
                 Err(damage) => {
                     // Try the next byte. Bytes that are no record pass for one with probability 2^-32, by the checksum.
@@ -252,9 +238,6 @@ impl Scanner {
         header: &Header,
         wanted: impl Fn(usize) -> bool,
     ) -> Option<Result<Block, Error>> {
-        if let Some(block) = self.misses_others.take() {
-            return Some(Ok(block));
-        }
         loop {
             let found = match self.next(reader, header) {
                 Ok(found) => found?,
@@ -271,16 +254,12 @@ impl Scanner {
             let Some(damage) = self.order.judge(block.number) else {
                 return Some(Ok(block));
             };
-            self.misses_others = (damage == Damage::Missing).then_some(block);
-            return Some(Err(Error::Block {
-                offset: found.offset,
-                bytes: if damage == Damage::Missing {
-                    0
-                } else {
-                    found.length as u64
-                },
-                damage,
-            }));
+            if damage == Damage::Missing {
+                // This is reported first, and the block by the next call.
+                self.pending = Some(found);
+                return Some(Err(Error::block(found.offset, 0, damage)));
+            }
+            return Some(Err(found.damaged(damage)));
         }
     }
 
@@ -313,15 +292,19 @@ impl Order {
         Self(number.map(|number| number.saturating_add(1)))
     }
 
-    /// Judges the next block: [`Damage::Missing`] if others should stand before it, [`Damage::Misplaced`] if it must not be read.
+    /// Judges the next block: [`Damage::Missing`] once if others should stand before it, [`Damage::Misplaced`] if it must not be read.
     pub(crate) fn judge(&mut self, number: Option<u64>) -> Option<Damage> {
         let number = number?;
         let expected = self.0.unwrap_or(number);
         if number < expected {
             return Some(Damage::Misplaced);
         }
+        if number > expected {
+            self.0 = Some(number);
+            return Some(Damage::Missing);
+        }
         self.0 = Some(number.saturating_add(1));
-        (number > expected).then_some(Damage::Missing)
+        None
     }
 }
 
@@ -359,16 +342,7 @@ impl<R: Read> BlockReader<R> {
     /// The end, or an error once if there should be one and is none.
     fn end(&mut self) -> Option<Result<Block, Error>> {
         let is_told = self.scanner.has_end || !self.header.has_end() || std::mem::replace(&mut self.told_end, true);
-        (!is_told).then(|| Err(no_bytes(self.scanner.consumed(), Damage::NoEnd)))
-    }
-}
-
-/// Damage that has no bytes of its own.
-pub(crate) fn no_bytes(offset: u64, damage: Damage) -> Error {
-    Error::Block {
-        offset,
-        bytes: 0,
-        damage,
+        (!is_told).then(|| Err(Error::block(self.scanner.consumed(), 0, Damage::NoEnd)))
     }
 }
 

@@ -61,6 +61,8 @@ pub struct Schema {
     pub(crate) time_name: String,
 }
 
+/// Largest number of columns.
+pub(crate) const MAX_COLUMNS: usize = 4096;
 /// Name of the times of a recording that states none.
 pub(crate) const TIME_NAME: &str = "time";
 
@@ -83,7 +85,7 @@ impl Schema {
     /// If there is no column, there are more than 4096, two have the same name, a clock has more than 18 decimals or its tolerance exceeds
     /// `2^52`.
     pub fn new(columns: Vec<Column>, time: TimeBase) -> Result<Self, Error> {
-        if columns.is_empty() || columns.len() > 4096 {
+        if columns.is_empty() || columns.len() > MAX_COLUMNS {
             return Err(ArgumentError::new("columns", columns.len(), "1 to 4096 columns").into());
         }
         let mut names: Vec<&str> = columns.iter().map(Column::name).collect();

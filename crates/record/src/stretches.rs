@@ -2,8 +2,9 @@
 
 use crate::aggregate::Aggregate;
 use crate::block::Block;
-use crate::blocks::Blocks;
+use crate::blocks::{Blocks, Part};
 use crate::error::Error;
+use crate::index::BlockInfo;
 use crate::integers::Integers;
 use crate::playback::Playback;
 use crate::whole::WholeAggregate;
@@ -64,6 +65,24 @@ impl Stretches {
         (is_inside && number == last.div_euclid(self.every)).then_some(number)
     }
 
+    /// Includes the aggregates of a block, if the index has them and it lies in one stretch.
+    fn merge(&mut self, entry: &BlockInfo, tolerance: i64) -> bool {
+        // The ticks of a reader may differ from those of the index by the tolerance.
+        let (first, last) = (entry.ticks.0.saturating_sub(tolerance), entry.ticks.1.saturating_add(tolerance));
+        let is_indexed = self.integers.iter().all(Option::is_none);
+        let number = self.of_all((first, last)).filter(|_| is_indexed);
+        let (Some(aggregates), Some(number)) = (&entry.aggregates, number) else {
+            return false;
+        };
+        let chosen = self.chosen.clone();
+        let stretch = self.at(number);
+        stretch.rows += entry.rows;
+        for (sum, column) in stretch.columns.iter_mut().zip(chosen) {
+            sum.merge(&aggregates[column]);
+        }
+        true
+    }
+
     fn add(&mut self, block: &Block) {
         let (chosen, integers) = (self.chosen.clone(), self.integers.clone());
         for (row, tick) in block.ticks.iter().enumerate() {
@@ -104,7 +123,6 @@ impl<R: Read + Seek> Playback<R> {
         let length = length.ok_or_else(|| ArgumentError::new("every", every, "1 to 2^63 - 1 ticks"))?;
         let columns = self.header.schema.columns();
         let integers: Vec<_> = self.chosen.iter().map(|column| columns[*column].integers()).collect();
-        let is_indexed = integers.iter().all(Option::is_none);
         let mut stretches = Stretches {
             every: length,
             ticks: (from, to),
@@ -114,27 +132,15 @@ impl<R: Read + Seek> Playback<R> {
         };
         let tolerance = i64::try_from(self.header.schema.time.tolerance()).unwrap_or(i64::MAX);
         let mut blocks = Blocks::new(self, (from, to));
-        loop {
-            // The ticks of a reader may differ from those of the index by the tolerance.
-            let wide = |(first, last): (i64, i64)| (first.saturating_sub(tolerance), last.saturating_add(tolerance));
-            while let Some((entry, aggregates)) =
-                blocks.known(|ticks| is_indexed && stretches.of_all(wide(ticks)).is_some())?
-            {
-                let Some(number) = stretches.of_all(wide(entry)) else {
-                    break;
-                };
-                let (rows, chosen) = (aggregates.0, stretches.chosen.clone());
-                let stretch = stretches.at(number);
-                stretch.rows += rows;
-                for (sum, column) in stretch.columns.iter_mut().zip(chosen) {
-                    sum.merge(&aggregates.1[column]);
-                }
-            }
-            match blocks.next() {
-                None => break,
-                Some(Ok(block)) => stretches.add(&block),
-                Some(Err(error @ Error::Block { .. })) => damaged(&error),
-                Some(Err(error)) => return Err(error),
+        while let Some(part) = blocks.part() {
+            let block = part.and_then(|part| match &part {
+                Part::Known(entry) if stretches.merge(entry, tolerance) => Ok(None),
+                _ => blocks.block(part).map(Some),
+            });
+            match block {
+                Ok(block) => block.iter().for_each(|block| stretches.add(block)),
+                Err(error @ Error::Block { .. }) => damaged(&error),
+                Err(error) => return Err(error),
             }
         }
         Ok(stretches.found.into_values().collect())

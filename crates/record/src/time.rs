@@ -9,7 +9,7 @@
 //!
 //! The first kind that is within the tolerance is used. All arithmetic is exact in 128 bits.
 
-use crate::bound::Promise;
+use crate::bound::Bound;
 use crate::codec::{self, CodecId, Context, Target};
 use crate::error::Damage;
 use crate::wire::{Bytes, push_varint, zigzag};
@@ -48,7 +48,7 @@ pub(crate) struct Grid {
 const MAX_BLOCK: i128 = 1 << 60;
 
 const INTEGERS: Target = Target {
-    promise: Promise::Exact,
+    bound: Bound::Lossless,
     period: None,
 };
 
@@ -72,6 +72,12 @@ impl Grid {
     fn tick(&self, block: u64, row: usize) -> Option<i64> {
         let rows = i128::from(block) * self.rows_per_block as i128 + row as i128;
         i64::try_from(i128::from(self.origin) + i128::from(self.step) * rows).ok()
+    }
+
+    /// The ticks of a block that is on the grid.
+    pub(crate) fn ticks(&self, block: u64, rows: usize) -> Result<Vec<i64>, Damage> {
+        let tick = |row| self.tick(block, row).ok_or(Damage::Content("ticks"));
+        (0..rows).map(tick).collect()
     }
 
     /// The block number, if the ticks are on the grid.
@@ -181,7 +187,7 @@ pub(crate) fn decode(kind: TimeKind, bytes: &mut Bytes<'_>, rows: usize, grid: &
     match kind {
         TimeKind::Grid => {
             let block = bytes.varint()?;
-            (0..rows).map(|row| grid.tick(block, row).ok_or(beyond)).collect()
+            grid.ticks(block, rows)
         }
         TimeKind::Even => {
             let start = grid.origin.wrapping_add(bytes.signed()?);

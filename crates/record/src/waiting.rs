@@ -1,10 +1,10 @@
 //! Rows that are not encoded yet.
 
-use crate::block::Cells;
+use crate::block::{Cells, Rows};
 use crate::header::Header;
 use crate::ranges::Ranges;
 use crate::schema::Schema;
-use fewbits_block_codec::ArgumentError;
+use fewbits_block_codec::{ArgumentError, Effort};
 
 /// Rows in the order of their arrival.
 #[derive(Debug)]
@@ -39,6 +39,18 @@ impl Waiting {
             cells.push(*cell);
         }
         Ok(())
+    }
+
+    /// The first rows as those of the block of this number.
+    pub(crate) fn first<'a>(&'a self, rows: usize, header: &'a Header, number: u64, effort: Effort) -> Rows<'a> {
+        Rows {
+            header,
+            number,
+            ticks: &self.ticks[..rows],
+            columns: self.columns.iter().map(|cells| &cells[..rows]).collect(),
+            own_bounds: self.ranges.own_bounds(header),
+            effort,
+        }
     }
 
     /// Removes the first rows.

@@ -1,8 +1,8 @@
-//! Texts as bytes, records with a length and a checksum. Integers and the byte reader are those of the block codec.
+//! Records with a length and a checksum. Integers, fields and the byte reader are those of the block codec.
 
 use crate::error::Damage;
 use fewbits_block_codec::bytes::Unread;
-pub(crate) use fewbits_block_codec::bytes::{Bytes, push_varint, unzigzag, zigzag};
+pub(crate) use fewbits_block_codec::bytes::{Bytes, Fields, push_varint, unzigzag, zigzag};
 use std::ops::RangeInclusive;
 
 /// The oldest version of the format that is read.
@@ -18,6 +18,13 @@ pub(crate) fn checksum(parts: &[&[u8]]) -> u32 {
         digest.update(part);
     }
     digest.finalize()
+}
+
+/// The bytes with their checksum behind them.
+pub(crate) fn with_checksum(mut bytes: Vec<u8>) -> Vec<u8> {
+    let sum = checksum(&[&bytes]);
+    bytes.extend(sum.to_le_bytes());
+    bytes
 }
 
 /// A record as it is written: head, length of the content, content, and the checksum of `check` and all of it.
@@ -59,16 +66,31 @@ pub(crate) fn read_checked(
     Ok((content, end + CHECK_BYTES))
 }
 
-/// Appends the length of a text and the text.
-pub(crate) fn push_text(bytes: &mut Vec<u8>, text: &str) {
-    push_varint(bytes, text.len() as u64);
-    bytes.extend_from_slice(text.as_bytes());
+/// The first three bytes of a bound, highest first.
+pub(crate) fn short_bound<F: Fields>(fields: &mut F, own: f64) -> Result<f64, Damage> {
+    let [a, b, c, ..] = own.to_be_bytes();
+    let [a, b, c] = fields.bytes([a, b, c])?;
+    let bound = f64::from_be_bytes([a, b, c, 0, 0, 0, 0, 0]);
+    let is_bound = bound >= 0.0 && (2.0 * bound).is_finite();
+    is_bound.then_some(bound).ok_or(Damage::Content("bound"))
 }
 
-/// Reads a text of [`push_text`].
-pub(crate) fn text<'a>(bytes: &mut Bytes<'a>) -> Result<&'a str, Damage> {
-    let length = bytes.count(bytes.0.len(), "length of a text")?;
-    std::str::from_utf8(bytes.take(length)?).map_err(|_| Damage::Content("text"))
+/// What a description writes.
+pub(crate) fn written<T>(describe: impl FnOnce(&mut Vec<u8>) -> Result<T, Damage>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let _ = describe(&mut bytes);
+    bytes
+}
+
+/// All that these bytes hold by this description.
+pub(crate) fn read<'a, T>(
+    content: &'a [u8],
+    describe: impl FnOnce(&mut Bytes<'a>) -> Result<T, Damage>,
+) -> Result<T, Damage> {
+    let mut reader = Bytes(content);
+    let found = describe(&mut reader)?;
+    reader.finish()?;
+    Ok(found)
 }
 
 #[cfg(test)]

@@ -87,7 +87,9 @@ fn blocks_have_the_bytes_of_before() {
                     .start(&samples[..100])
                     .unwrap_or_else(|| codec.start(&[1.0, 2.0]).unwrap());
                 let started = codec.encode_from(&start, &samples, &[]).unwrap();
-                let all = [plain.as_slice(), &joint, &start.to_bytes(), &started.bytes].concat();
+                let mut taught = Vec::new();
+                codec.code_start(&mut taught, Some(&start)).unwrap();
+                let all = [plain, joint, taught, started.bytes].concat();
                 let expected = golden.next().unwrap();
                 assert_eq!((kind, name), (expected.0, expected.1));
                 if (all.len(), hash(&all)) != (expected.2, expected.3) {

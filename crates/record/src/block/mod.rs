@@ -12,7 +12,7 @@ use crate::error::Damage;
 use crate::header::Header;
 use crate::wire::read_checked;
 pub(crate) use read::{content_of, decode, only, renewed};
-pub(crate) use write::{content, encode};
+pub(crate) use write::Rows;
 
 /// The cells of one column; `None` is a gap.
 pub type Cells = Vec<Option<f64>>;

@@ -10,7 +10,7 @@ use crate::error::{Damage, Error};
 use crate::header::{Header, VERSION_5};
 use crate::specials::{self, Specials};
 use crate::time::{self, TimeKind};
-use crate::wire::{Bytes, push_varint};
+use crate::wire::{Bytes, push_varint, short_bound};
 use fewbits_block_codec::arithmetic::Reader;
 
 /// Decodes one block whose checksum was verified. Columns that are not `wanted` stay empty.
@@ -29,34 +29,29 @@ struct Head {
 fn read_head(header: &Header, body: &mut Bytes<'_>) -> Result<Head, Damage> {
     let head = body.varint()?;
     let apart = (head >> 1 & 1) * APART;
-    Ok(match (header.version, head & 1) {
-        (VERSION_5, 0) => Head {
-            number: None,
-            usual: Some(head >> 2),
-            flags: apart,
+    let (is_old, has_flags) = (header.version == VERSION_5, head & 1 == 1);
+    let flags = match (has_flags, is_old) {
+        (false, _) => apart,
+        (true, true) => head >> 1,
+        (true, false) => match body.varint()? {
+            flags if flags & APART == 0 => flags | apart,
+            _ => return Err(Damage::Content("flags")),
         },
-        (VERSION_5, _) => Head {
-            number: None,
-            usual: None,
-            flags: head >> 1,
-        },
-        (_, 0) => Head {
-            number: Some(head >> 2),
-            usual: Some(head >> 2),
-            flags: apart,
-        },
-        _ => {
-            let flags = body.varint()?;
-            if flags & APART != 0 {
-                return Err(Damage::Content("flags"));
-            }
-            Head {
-                number: Some(head >> 2),
-                usual: None,
-                flags: flags | apart,
-            }
-        }
+    };
+    Ok(Head {
+        number: (!is_old).then_some(head >> 2),
+        usual: (!has_flags).then_some(head >> 2),
+        flags,
     })
+}
+
+/// Appends the first numbers of a block, which [`read_head`] reads.
+pub(super) fn push_head(body: &mut Vec<u8>, number: u64, is_usual: bool, flags: u64) {
+    let apart = u64::from(flags & APART != 0);
+    push_varint(body, 4 * number + 2 * apart + u64::from(!is_usual));
+    if !is_usual {
+        push_varint(body, flags & !APART);
+    }
 }
 
 /// The content of a block.
@@ -70,15 +65,13 @@ pub(crate) fn content_of(bytes: &[u8]) -> Result<&[u8], Damage> {
 pub(crate) fn renewed(header: &Header, content: &[u8], number: u64) -> Result<Vec<u8>, Damage> {
     let mut body = Bytes(content);
     let Head { usual, flags, .. } = read_head(header, &mut body)?;
-    let rows = header.odd_rows().filter(|_| flags & ROWS_FOLLOW == 0);
+    let rows =
+        Some(header.block_rows()).filter(|rows| *rows != header.schema.rows_per_block && flags & ROWS_FOLLOW == 0);
     let mut content = Vec::new();
-    let first = 4 * number + 2 * u64::from(flags & APART != 0);
-    if usual == Some(number) && rows.is_none() {
-        push_varint(&mut content, first);
-    } else {
-        push_varint(&mut content, first + 1);
-        let rows_follow = if rows.is_some() { ROWS_FOLLOW } else { 0 };
-        push_varint(&mut content, flags & !APART | rows_follow);
+    let is_usual = usual == Some(number) && rows.is_none();
+    let rows_follow = if rows.is_some() { ROWS_FOLLOW } else { 0 };
+    push_head(&mut content, number, is_usual, flags | rows_follow);
+    if !is_usual {
         rows.into_iter().for_each(|rows| push_varint(&mut content, rows as u64));
         usual.into_iter().for_each(|on_grid| push_varint(&mut content, on_grid));
     }
@@ -96,11 +89,7 @@ pub(crate) fn only(
     bytes: u64,
     wanted: impl Fn(usize) -> bool,
 ) -> Result<Block, Error> {
-    decode_content(header, content, wanted).map_err(|damage| Error::Block {
-        offset: 0,
-        bytes,
-        damage,
-    })
+    decode_content(header, content, wanted).map_err(|damage| Error::block(0, bytes, damage))
 }
 
 /// Decodes the content of a block.
@@ -119,9 +108,7 @@ pub(crate) fn decode_content(header: &Header, content: &[u8], wanted: impl Fn(us
         descriptors.fill(CodecId::Adaptive as u8);
     }
     let ticks = if let Some(on_grid) = usual {
-        let mut block = Vec::new();
-        push_varint(&mut block, on_grid);
-        time::decode(TimeKind::Grid, &mut Bytes(&block), rows, &grid)?
+        grid.ticks(on_grid, rows)?
     } else {
         if flags & ROWS_FOLLOW != 0 {
             rows = body.count(rows, "number of rows")?;
@@ -223,10 +210,13 @@ fn read_section<'a>(
         return Ok(Section { id, own, others, bytes });
     }
     let own = if descriptor & BOUND_FOLLOWS != 0 {
-        Some(read_bound(body)?)
+        Some(short_bound(body, 0.0)?)
     } else {
         None
     };
+    if own == Some(0.0) {
+        return Err(Damage::Content("bound"));
+    }
     let mut others = Vec::new();
     if descriptor & OTHERS_FOLLOW != 0 {
         let count = usize::from(body.byte()?) + 1;
@@ -276,15 +266,5 @@ impl Section<'_> {
     fn share_bound(&self, header: &Header, column: usize) -> Option<f64> {
         let shared = matches!(header.schema.columns[column].bound, Bound::ShareOfRange(_));
         shared.then(|| self.own.unwrap_or(header.share_bounds[column]))
-    }
-}
-
-fn read_bound(body: &mut Bytes<'_>) -> Result<f64, Damage> {
-    let [a, b, c] = body.array()?;
-    let bound = f64::from_be_bytes([a, b, c, 0, 0, 0, 0, 0]);
-    if bound > 0.0 && (2.0 * bound).is_finite() {
-        Ok(bound)
-    } else {
-        Err(Damage::Content("bound"))
     }
 }

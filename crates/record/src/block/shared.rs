@@ -75,7 +75,7 @@ fn others<C: Coder>(coder: &mut C, column: usize, wanted: &[usize]) -> Result<Ve
 /// The arithmetic code of all columns that have indices.
 pub(super) fn encode(
     header: &Header,
-    cells: &[Cells],
+    cells: &[&[Option<f64>]],
     specials: &[Specials],
     indices: &[Option<Vec<i64>>],
     restored: &[Cells],
@@ -103,10 +103,7 @@ pub(super) fn encode(
         };
         // The code goes on from the shorter of two versions. A reader is told which, so the choice may be any.
         let alone = written(&[]);
-        let related = match effort {
-            Effort::Thorough => related::columns(&cells[column], &restored[..column]),
-            _ => Vec::new(),
-        };
+        let related = related::columns(cells[column], &restored[..column], effort);
         let joint = (!related.is_empty()).then(|| written(&related));
         writer = joint.filter(|joint| joint.bits() < alone.bits()).unwrap_or(alone);
     }

@@ -1,9 +1,9 @@
 //! Encoding of a block.
 
-use super::read::decode_content;
+use super::read::{decode_content, push_head};
 use super::{
-    BOUND_FOLLOWS, Cells, DESCRIPTORS_FOLLOW, OTHERS_FOLLOW, ROWS_FOLLOW, SHARED_COLUMNS, SPECIALS_FOLLOW, aligned,
-    plain, shared,
+    APART, BOUND_FOLLOWS, Cells, DESCRIPTORS_FOLLOW, OTHERS_FOLLOW, ROWS_FOLLOW, SHARED_COLUMNS, SPECIALS_FOLLOW,
+    aligned, plain, shared,
 };
 use crate::codec::{self, CodecId, Context};
 use crate::header::Header;
@@ -52,10 +52,7 @@ fn encode_column(
     }
     let has_value: Vec<bool> = specials.iter().map(Option::is_none).collect();
     let samples = aligned(cells, &has_value);
-    let mut others = match effort {
-        Effort::Thorough => related::columns(cells, before),
-        _ => Vec::new(),
-    };
+    let mut others = related::columns(cells, before, effort);
     let values: Vec<Vec<f64>> = others.iter().map(|i| aligned(&before[*i], &has_value)).collect();
     let values: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
     let context = Context {
@@ -99,81 +96,50 @@ fn encode_column(
     }
 }
 
-/// A block's bytes, and the cells as a reader will restore them. `number` is that of the block in its recording.
-pub(crate) fn encode(
-    header: &Header,
-    number: u64,
-    ticks: &[i64],
-    columns: &[Cells],
-    own_bounds: &[Option<f64>],
-    effort: Effort,
-) -> (Vec<u8>, Vec<Cells>) {
-    let (content, restored) = content(header, number, ticks, columns, own_bounds, effort);
-    (checked(header.check, &[], &content), restored)
-}
-
-/// As [`encode`], without length and checksum.
-pub(crate) fn content(
-    header: &Header,
-    number: u64,
-    ticks: &[i64],
-    columns: &[Cells],
-    own_bounds: &[Option<f64>],
-    effort: Effort,
-) -> (Vec<u8>, Vec<Cells>) {
-    let may_share = columns.len() <= SHARED_COLUMNS;
-    let rows = Rows {
-        header,
-        number,
-        ticks,
-        columns,
-        own_bounds,
-        effort,
-    };
-    let (content, restored, shares) = rows.encoded(may_share);
-    // Columns with bytes of their own were verified one by one.
-    let is_read = || {
-        let read = decode_content(header, &content, |_| true);
-        let read = read.map(|block| block.columns).unwrap_or_default();
-        let bits = |columns: &[Cells]| {
-            columns
-                .iter()
-                .flatten()
-                .map(|cell| cell.map(f64::to_bits))
-                .collect::<Vec<_>>()
-        };
-        bits(&read) == bits(&restored)
-    };
-    if !shares || is_read() {
-        return (content, restored);
-    }
-    let (content, restored, _) = rows.encoded(false);
-    (content, restored)
-}
-
 /// The rows of a block, and what their code depends on.
-struct Rows<'a> {
-    header: &'a Header,
-    number: u64,
-    ticks: &'a [i64],
-    columns: &'a [Cells],
-    own_bounds: &'a [Option<f64>],
-    effort: Effort,
+pub(crate) struct Rows<'a> {
+    pub(crate) header: &'a Header,
+    /// That of the block in its recording.
+    pub(crate) number: u64,
+    pub(crate) ticks: &'a [i64],
+    pub(crate) columns: Vec<&'a [Option<f64>]>,
+    /// The bounds that the block must state itself.
+    pub(crate) own_bounds: Vec<Option<f64>>,
+    pub(crate) effort: Effort,
 }
 
 impl Rows<'_> {
+    /// The block's bytes, and the cells as a reader will restore them.
+    pub(crate) fn block(&self) -> (Vec<u8>, Vec<Cells>) {
+        let (content, restored) = self.content();
+        (checked(self.header.check, &[], &content), restored)
+    }
+
+    /// As [`block`](Self::block), without length and checksum.
+    pub(crate) fn content(&self) -> (Vec<u8>, Vec<Cells>) {
+        let (content, restored, shares) = self.encoded(self.columns.len() <= SHARED_COLUMNS);
+        // Columns with bytes of their own were verified one by one.
+        let is_read = || {
+            let read = decode_content(self.header, &content, |_| true);
+            let read = read.map(|block| block.columns).unwrap_or_default();
+            let bits = |columns: &[Cells]| -> Vec<_> {
+                let cells = columns.iter().flatten();
+                cells.map(|cell| cell.map(f64::to_bits)).collect()
+            };
+            bits(&read) == bits(&restored)
+        };
+        if !shares || is_read() {
+            return (content, restored);
+        }
+        let (content, restored, _) = self.encoded(false);
+        (content, restored)
+    }
+
     /// The content without verifying the shared code. The third value says whether there is one.
     fn encoded(&self, may_share: bool) -> (Vec<u8>, Vec<Cells>, bool) {
-        let Self {
-            header,
-            number,
-            ticks,
-            columns,
-            own_bounds,
-            effort,
-        } = *self;
-        let (mut coded, mut restored) = (Vec::with_capacity(columns.len()), Vec::with_capacity(columns.len()));
-        for (cells, own) in columns.iter().zip(own_bounds) {
+        let (header, number, ticks, effort) = (self.header, self.number, self.ticks, self.effort);
+        let (mut coded, mut restored) = (Vec::new(), Vec::with_capacity(self.columns.len()));
+        for (cells, own) in self.columns.iter().zip(&self.own_bounds) {
             let mut column = encode_column(header, cells, *own, &restored, effort, may_share);
             restored.push(std::mem::take(&mut column.restored));
             coded.push(column);
@@ -193,36 +159,32 @@ impl Rows<'_> {
             .map(|column| std::mem::take(&mut column.specials))
             .collect();
         let told = !shares && specials.iter().flatten().any(Option::is_some);
-        match (kind, Bytes(&time).varint()) {
-            (TimeKind::Grid, Ok(block)) if all_plain && whole && !told && block == number => {
-                // The usual block: bit 0 is 0, bit 1 says whether columns are apart, the rest is its number, also on the grid.
-                push_varint(&mut body, 4 * block + 2 * u64::from(apart))
+        let flag = |given: bool, flag: u64| if given { flag } else { 0 };
+        let flags = kind as u64
+            | flag(!whole, ROWS_FOLLOW)
+            | flag(!all_plain, DESCRIPTORS_FOLLOW)
+            | flag(told, SPECIALS_FOLLOW);
+        // Nothing else follows the number of a block that stands there on the grid too.
+        let is_usual = flags == TimeKind::Grid as u64 && Bytes(&time).varint() == Ok(number);
+        push_head(&mut body, number, is_usual, flags | flag(apart, APART));
+        if !is_usual {
+            if !whole {
+                push_varint(&mut body, ticks.len() as u64);
             }
-            _ => {
-                let flag = |given: bool, flag: u64| if given { flag } else { 0 };
-                let flags =
-                    flag(!whole, ROWS_FOLLOW) | flag(!all_plain, DESCRIPTORS_FOLLOW) | flag(told, SPECIALS_FOLLOW);
-                // Two bits of the kind of times, and the flags that say what follows.
-                push_varint(&mut body, 4 * number + 2 * u64::from(apart) + 1);
-                push_varint(&mut body, kind as u64 | flags);
-                if !whole {
-                    push_varint(&mut body, ticks.len() as u64);
-                }
-                body.extend_from_slice(&time);
-                if !all_plain {
-                    body.extend(has_own.chunks(8).map(|eight| {
-                        let bits = eight.iter().enumerate();
-                        bits.fold(0, |byte, (i, own)| byte | u8::from(*own) << i)
-                    }));
-                    let columns = coded.iter().zip(&has_own);
-                    body.extend(columns.filter(|(_, own)| **own).map(|(column, _)| column.descriptor));
-                }
-                if told {
-                    let bytes = specials::encode(&specials, ticks.len());
-                    push_varint(&mut body, bytes.len() as u64);
-                    body.extend(bytes);
-                }
-            }
+            body.extend_from_slice(&time);
+        }
+        if !all_plain {
+            body.extend(has_own.chunks(8).map(|eight| {
+                let bits = eight.iter().enumerate();
+                bits.fold(0, |byte, (i, own)| byte | u8::from(*own) << i)
+            }));
+            let columns = coded.iter().zip(&has_own);
+            body.extend(columns.filter(|(_, own)| **own).map(|(column, _)| column.descriptor));
+        }
+        if told {
+            let bytes = specials::encode(&specials, ticks.len());
+            push_varint(&mut body, bytes.len() as u64);
+            body.extend(bytes);
         }
         let last = coded.len() - 1;
         let alone = coded.iter().enumerate().filter(|(_, column)| column.indices.is_none());
@@ -235,7 +197,7 @@ impl Rows<'_> {
         }
         if shares {
             let indices: Vec<Option<Vec<i64>>> = coded.into_iter().map(|column| column.indices).collect();
-            body.extend(shared::encode(header, columns, &specials, &indices, &restored, effort));
+            body.extend(shared::encode(header, &self.columns, &specials, &indices, &restored, effort));
         }
         (body, restored, shares)
     }

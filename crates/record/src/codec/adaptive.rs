@@ -2,16 +2,17 @@
 
 use super::relative::Lattice;
 use super::{Context, Target};
-use crate::bound::{Promise, TENS};
+use crate::bound::{Bound, TENS};
 use crate::error::Damage;
+use fewbits_block_codec::bytes::Fields;
 use fewbits_block_codec::{BlockCodec, Effort, Start};
 use std::borrow::Cow;
 
 /// The codec for a bound. For decimals, samples are rounded before and then restored exactly.
 pub(crate) fn codec(target: &Target) -> Option<BlockCodec> {
-    let delta = match target.promise {
-        Promise::Exact | Promise::Decimals(_) | Promise::Relative { .. } => return Some(BlockCodec::lossless()),
-        Promise::Within(delta) => delta,
+    let delta = match target.bound {
+        Bound::Absolute(delta) => delta,
+        _ => return Some(BlockCodec::lossless()),
     };
     let codec = BlockCodec::new(delta).ok()?;
     match target.period {
@@ -34,9 +35,9 @@ fn rounded(sample: f64, places: u8) -> f64 {
 
 /// The samples that are passed to the codec.
 pub(crate) fn prepared<'a>(samples: &'a [f64], target: &Target) -> Cow<'a, [f64]> {
-    match target.promise {
-        Promise::Decimals(places) => samples.iter().map(|sample| rounded(*sample, places)).collect(),
-        Promise::Relative { share, floor } => {
+    match target.bound {
+        Bound::Decimals(places) => samples.iter().map(|sample| rounded(*sample, places)).collect(),
+        Bound::Relative { share, floor } => {
             let lattice = Lattice::new(share, floor);
             samples.iter().map(|sample| lattice.index(*sample) as f64).collect()
         }
@@ -46,8 +47,8 @@ pub(crate) fn prepared<'a>(samples: &'a [f64], target: &Target) -> Cow<'a, [f64]
 
 /// The samples of what the codec has decoded: the inverse of [`prepared`].
 pub(crate) fn restored(values: Vec<f64>, target: &Target) -> Vec<f64> {
-    match target.promise {
-        Promise::Relative { share, floor } => {
+    match target.bound {
+        Bound::Relative { share, floor } => {
             let lattice = Lattice::new(share, floor);
             // No writer writes an index that is not whole; one that a forger writes saturates.
             values.into_iter().map(|index| lattice.value(index as i64)).collect()
@@ -61,8 +62,9 @@ pub(crate) fn start(samples: &[f64], target: &Target) -> Option<Start> {
     codec(target)?.start(&prepared(samples, target))
 }
 
-pub(crate) fn read_start(bytes: &mut &[u8], target: &Target) -> Result<Start, Damage> {
-    let start = codec(target).and_then(|codec| codec.read_start(bytes).ok());
+/// The start as fields; a reader has none.
+pub(crate) fn code_start<F: Fields>(fields: &mut F, own: Option<&Start>, target: &Target) -> Result<Start, Damage> {
+    let start = codec(target).and_then(|codec| codec.code_start(fields, own).ok());
     start.ok_or(Damage::Content("start of blocks"))
 }
 

@@ -14,7 +14,7 @@ pub(crate) mod adaptive;
 mod plain;
 mod relative;
 
-use crate::bound::Promise;
+use crate::bound::Bound;
 use crate::error::Damage;
 use fewbits_block_codec::{Effort, Start};
 
@@ -44,13 +44,13 @@ impl CodecId {
 /// The bound of a column in one block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Target {
-    pub(crate) promise: Promise,
+    pub(crate) bound: Bound,
     pub(crate) period: Option<f64>,
 }
 
 impl Target {
     pub(crate) fn holds(&self, sample: f64, restored: f64) -> bool {
-        self.promise.holds(sample, restored, self.period)
+        self.bound.holds(sample, restored, self.period)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Codes without a model: the doubles themselves, or one number for all samples.
 
 use super::Target;
-use crate::bound::Promise;
+use crate::bound::Bound;
 use crate::error::Damage;
 
 pub(super) fn raw(samples: &[f64]) -> Vec<u8> {
@@ -24,12 +24,12 @@ pub(super) fn constant(samples: &[f64], target: &Target) -> Option<Vec<u8>> {
     let ends = samples
         .iter()
         .fold((first, first), |(low, high), x| (low.min(*x), high.max(*x)));
-    let middle = match target.promise {
-        Promise::Within(delta) if target.period.is_none() && ends.1 - ends.0 <= 2.0 * delta => {
+    let middle = match target.bound {
+        Bound::Absolute(delta) if target.period.is_none() && ends.1 - ends.0 <= 2.0 * delta => {
             ends.0 + 0.5 * (ends.1 - ends.0)
         }
         // The largest and the smallest allow the same numbers as all others.
-        Promise::Relative { .. } => ends.0 + 0.5 * (ends.1 - ends.0),
+        Bound::Relative { .. } => ends.0 + 0.5 * (ends.1 - ends.0),
         _ => first,
     };
     let short = |kept: usize| {

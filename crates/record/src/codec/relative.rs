@@ -97,19 +97,19 @@ impl Lattice {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bound::Promise;
+    use crate::bound::Bound;
 
     #[test]
     fn every_value_is_near_its_point() {
         for share in [1e-6, 1e-4, 0.01, 0.07, 1.0 / 3.0, 0.5] {
             for floor in [1e-30, 1e-3, 7.0, 1e12] {
-                let (lattice, promise) = (Lattice::new(share, floor), Promise::Relative { share, floor });
+                let (lattice, bound) = (Lattice::new(share, floor), Bound::Relative { share, floor });
                 for i in -4000..4000 {
                     let x = floor * 1.003_f64.powi(i.max(-3000)) * if i % 2 == 0 { 1.0 } else { -1.0 };
                     for sample in [x, x * 1e40, x * 1e200, f64::from(i) * floor * 0.37] {
                         let value = lattice.value(lattice.index(sample));
                         assert!(
-                            !sample.is_finite() || promise.holds(sample, value, None),
+                            !sample.is_finite() || bound.holds(sample, value, None),
                             "{share} {floor} {sample} {value}"
                         );
                     }

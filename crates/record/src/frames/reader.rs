@@ -5,7 +5,7 @@ use super::piece::Piece;
 use crate::block::{self, Block};
 use crate::error::{Damage, Error};
 use crate::header::{Header, MAX_HEADER};
-use crate::header_read::Known;
+use crate::header_bytes::Known;
 use crate::schema::Schema;
 use std::collections::{HashSet, VecDeque};
 use std::hash::{BuildHasher, RandomState};
@@ -121,11 +121,7 @@ impl FrameReader {
     /// [`Error::OtherTable`] if the frame is a piece of another header; if it is damaged, or, which looks the same, a block of another
     /// header. The reader is then unchanged.
     pub fn handle(&mut self, frame: &[u8]) -> Result<Vec<Block>, Error> {
-        let damaged = |damage| Error::Block {
-            offset: 0,
-            bytes: frame.len() as u64,
-            damage,
-        };
+        let damaged = |damage| Error::block(0, frame.len() as u64, damage);
         if Piece::is_one(frame) {
             let piece = Piece::of_frame(frame).map_err(damaged)?;
             return match &self.header {

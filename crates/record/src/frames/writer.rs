@@ -2,7 +2,6 @@
 
 use super::piece::{PIECE_OVERHEAD, Piece};
 use super::{MAX_PIECES, max_rows};
-use crate::block::{self, Cells};
 use crate::error::Error;
 use crate::header::{Form, Header, MAX_START};
 use crate::schema::Schema;
@@ -28,7 +27,6 @@ pub struct FrameWriter {
     rows: Waiting,
     /// Number of rows at which it is next tried whether they fill a frame.
     next_trial: usize,
-    has_sent: bool,
     /// Number of frames so far, which is that of the next one.
     frames: u64,
 }
@@ -55,7 +53,6 @@ impl FrameWriter {
             max_bytes,
             rows: Waiting::new(columns),
             next_trial: 1,
-            has_sent: false,
             frames: 0,
             schema,
         })
@@ -82,7 +79,7 @@ impl FrameWriter {
     }
 
     fn sent_header(&self) -> Option<&Header> {
-        self.header.as_ref().filter(|_| self.has_sent)
+        self.header.as_ref().filter(|_| self.frames > 0)
     }
 
     /// Frames with the pieces of the header; none before the first frame with rows. They state that all frames so far were sent.
@@ -182,7 +179,6 @@ impl FrameWriter {
     }
 
     fn forget(&mut self, rows: usize) {
-        self.has_sent = true;
         self.frames += 1;
         self.rows.remove(rows);
         self.next_trial = rows.max(1);
@@ -190,7 +186,7 @@ impl FrameWriter {
 
     fn encode(&mut self, rows: usize) -> Result<Vec<u8>, Error> {
         // The first frame: the header's starts follow from all waiting rows.
-        if !self.has_sent {
+        if self.frames == 0 {
             self.header = Some(
                 self.rows
                     .header(&self.schema)
@@ -201,9 +197,7 @@ impl FrameWriter {
         let Some(header) = &self.header else {
             return Err(Error::Broken);
         };
-        let Waiting { ticks, columns, ranges } = &self.rows;
-        let own = ranges.own_bounds(header);
-        let cells: Vec<Cells> = columns.iter().map(|cells| cells[..rows].to_vec()).collect();
-        Ok(block::encode(header, self.frames, &ticks[..rows], &cells, &own, Effort::Thorough).0)
+        let rows = self.rows.first(rows, header, self.frames, Effort::Thorough);
+        Ok(rows.block().0)
     }
 }

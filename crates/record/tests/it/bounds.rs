@@ -191,3 +191,18 @@ fn header_of_a_small_file_takes_24_bytes_beside_names() {
         }
     }
 }
+
+/// The bound that a header states in fewer digits is not too small for the circle.
+#[test]
+fn recordings_of_the_smallest_bound_on_a_circle_are_read() {
+    let cells = (1_u64 << 40) as f64;
+    for share in [1.0, 1.000_001, 1.000_02, 1.5] {
+        let bound = 360.0 / cells * share;
+        let column = Column::new("direction", Bound::Absolute(bound)).unwrap();
+        let samples = [0.1, 359.5, 12.0, 11.9];
+        let (column, values) = restored(&packed(column.with_period(360.0).unwrap(), &samples));
+        let mut pairs = samples.iter().zip(&values);
+        assert!(pairs.all(|(x, value)| column.keeps(Some(*x), Some(*value), None)), "{share}");
+        assert!(matches!(column.bound(), Bound::Absolute(stated) if stated <= bound), "{share}");
+    }
+}
