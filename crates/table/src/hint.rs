@@ -43,7 +43,7 @@ pub(crate) fn hint(text: &str) -> &'static str {
     } else if plain && commas == 1 && points == 0 {
         "if it has a decimal comma, say --decimal , (and --delimiter ';' or tab)"
     } else if plain && (commas > 1 || (commas == 1 && points == 1)) {
-        if text.rfind(',') > text.rfind('.') {
+        if points > 0 && text.rfind(',') > text.rfind('.') {
             "say --decimal , --thousands ."
         } else {
             "say --thousands ,"

@@ -115,7 +115,7 @@ impl Table {
                 let cell = scanner.cells[*column];
                 let gaps = &self.gaps[*column];
                 match (&mut batch.columns[i], cell.number) {
-                    (Cells::Numbers(numbers), Some((value, _))) => {
+                    (Cells::Numbers(numbers), Some((value, _))) if !self.dialect.strip_units => {
                         numbers.push(Some(value).filter(|_| !gaps.has_numbers() || !gaps.has_number(value)));
                     }
                     (Cells::Numbers(numbers), None) if cell.is_empty() => numbers.push(None),
@@ -269,7 +269,9 @@ impl Table {
                     numbers.push(None);
                     continue;
                 }
-                if let Ok(Number::Double(value, _)) = number::parse(cell, self.syntax) {
+                if let (false, Ok(Number::Double(value, _))) =
+                    (self.dialect.strip_units, number::parse(cell, self.syntax))
+                {
                     let gaps = &self.gaps[*column];
                     numbers.push(Some(value).filter(|_| !gaps.has_numbers() || !gaps.has_number(value)));
                     continue;

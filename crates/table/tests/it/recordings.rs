@@ -173,7 +173,46 @@ fn lines_of_marks_counts_and_comments() {
     // Below the first lines such a line may be a row with a fault, so that it is asked for.
     let message = not_opened(&(lines("time,x\n", 50, |i| format!("{i},{i}.5")) + "// restart\n"));
     assert!(message.contains("--comment //"), "{message}");
+    // A list's lines end in commas.
+    let text = lines("", 5, |i| format!("{{\"time\":{i},\"x\":{i}.5}},"));
+    assert_eq!(numbers(&rows(&mut open(&text)).columns[0])[4], Some(4.5));
     // Marks of quality are no words.
     let message = not_opened(&lines("time,x\n", 60, |i| format!("{i},{i}.5{}", if i % 4 == 0 { "" } else { "*" })));
     assert!(message.contains("--strip-units"), "{message}");
+}
+
+#[test]
+fn numbers_that_lost_a_part() {
+    for cell in ["1.70963E+12", "1.70963E+09", "1,70963E+12"] {
+        let message = not_opened(&lines("time;x\n", 9, |i| format!("{cell};{i}")));
+        assert!(message.contains("lost its last digits"), "{cell}: {message}");
+    }
+    let mut table = open(&lines("time,x\n", 9, |i| format!("1.709632680{i}E+09,{i}")));
+    assert_eq!(seconds(&rows(&mut table))[1], 1_709_632_680.1);
+    let message = not_opened(&lines("time,x\n", 9, |i| format!("{i},\"1,234,00{i}\"")));
+    assert!(message.contains("say --thousands ,") && !message.contains("--decimal"), "{message}");
+    // A share of 1 among shares of a hundred.
+    let said = Dialect {
+        strip_units: true,
+        ..Dialect::default()
+    };
+    let text = lines("time,x\n", 9, |i| {
+        if i == 4 {
+            "4,0.5".to_owned()
+        } else {
+            format!("{i},{}%", i * 10)
+        }
+    });
+    let message = refusal(&mut open_said(&text, &said).unwrap());
+    assert!(message.contains("line 6") && message.contains("`0.5` has no `%`"), "{message}");
+    let text = lines("time,x\n", 9, |i| {
+        if i == 4 {
+            "4,0".to_owned()
+        } else {
+            format!("{i},{i}.5{}", ["%", " %"][i % 2])
+        }
+    });
+    assert_eq!(numbers(&rows(&mut open_said(&text, &said).unwrap()).columns[1])[4], Some(0.0));
+    let text = lines("time,x\n", 9, |i| format!("{i},{i}.5{}", ["", "*"][i % 2]));
+    assert_eq!(numbers(&rows(&mut open_said(&text, &said).unwrap()).columns[1])[4], Some(4.5));
 }
