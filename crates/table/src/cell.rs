@@ -19,6 +19,13 @@ pub(crate) struct Meaning<'a> {
     pub(crate) unit: Option<&'a str>,
 }
 
+impl Meaning<'_> {
+    /// Whether numbers are shares of a hundred whose sign is cut off. Others may be shares of 1.
+    fn has_per_cent(&self) -> bool {
+        self.strips && self.unit == Some("%")
+    }
+}
+
 /// Adds a cell to the cells of its column.
 pub(crate) fn push_cell(
     cells: &mut Cells,
@@ -87,6 +94,9 @@ fn number(text: &str, meaning: &Meaning<'_>) -> Result<Option<f64>, number::Prob
         _ => parsed,
     };
     match parsed {
+        Ok(Number::Double(value, _)) if value != 0.0 && meaning.has_per_cent() && without_unit(text).is_none() => {
+            Err(("has no `%`, and others of the column have one", "write it, or leave such rows out with --skip-bad"))
+        }
         Ok(Number::Double(value, _)) => Ok(Some(value).filter(|_| !meaning.gaps.has_number(value))),
         Ok(Number::Whole(_)) => Err((
             "is a whole number of more than 53 bits among numbers that are read as doubles",

@@ -206,10 +206,25 @@ fn fraction(text: &str) -> Option<(i128, &str)> {
     Some((format!("{kept:0<18}").parse().ok()?, &text[count..]))
 }
 
+/// Seconds since 1970 of a date and a second of the day, as if it were UTC.
+pub(crate) fn seconds(date: Date, second: i64) -> i64 {
+    let epoch = Date::constant(1970, 1, 1);
+    let days = date.since(epoch).map_or(0, |span| i64::from(span.get_days()));
+    days * 86_400 + second
+}
+
 /// Seconds and attoseconds of a time of day, whether it is a leap second, and what follows.
 pub(crate) fn of_day(text: &str) -> Option<(i64, i128, bool, &str)> {
-    let (hours, _, rest) = digits(text, 9)?;
-    let (minutes, _, mut rest) = digits(rest.strip_prefix(':')?, 2)?;
+    let (hours, count, rest) = digits(text, 9)?;
+    let (behind, is_lettered) = match rest.strip_prefix(':') {
+        Some(behind) => (behind, false),
+        // `21h30`, as in French.
+        None => (rest.strip_prefix(['h', 'H']).filter(|_| count <= 2)?, true),
+    };
+    let (minutes, count, mut rest) = digits(behind, 2)?;
+    if is_lettered && (count != 2 || rest.starts_with(|c: char| c.is_alphanumeric())) {
+        return None;
+    }
     let (mut seconds, mut parts) = (0, 0);
     if let Some(behind) = rest.strip_prefix(':') {
         let (value, count, behind) = digits(behind, 4)?;

@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::guess::{self, Doubt};
 use crate::interval;
 use crate::named::{NAMES, OF_DAY, is_exact_name, is_time_name, starts_an_interval};
-use crate::parts::{Part, calendar, is_hour_and_minute, monthly, of_day_parts, parts};
+use crate::parts::{Part, calendar, is_hour_and_minute, monthly, of_day_parts, parts, weeks};
 use crate::time::{Scale, Time, Unit};
 use crate::written::{self, Clock, Order, Problem, Syntax};
 use std::borrow::Cow;
@@ -110,8 +110,9 @@ pub(crate) fn guess(
         }
     }
     let dated = if dates.is_empty() { days } else { dates };
-    if let (true, Some(calendar)) = (dated.is_empty(), calendar(columns)) {
-        return Some(calendar);
+    let by_parts = || calendar(columns).or_else(|| weeks(columns).filter(|_| !has_named));
+    if let (true, Some(found)) = (dated.is_empty(), by_parts()) {
+        return Some(found);
     }
     if let (true, Some([year, month])) = (dated.is_empty(), monthly(columns)) {
         let is_month = |cell: &String| cell.parse::<u8>().is_ok_and(|month| (1..=12).contains(&month));
@@ -132,20 +133,26 @@ pub(crate) fn guess(
             return Some(vec![by_name.copied().unwrap_or(several[0])]);
         }
     }
+    // `T` is a temperature as often as a time, which does not go back again and again.
+    let may_be = |i: &usize| {
+        columns[*i].own_name.to_lowercase() != "t"
+            || (!guess::goes_back(samples[*i]) && (*i == 0 || columns[*i].own_name == "t"))
+    };
     let with_unit = |name: &str| {
         columns
             .iter()
             .position(|column| is_exact_name(&column.own_name.to_lowercase(), name))
+            .filter(may_be)
     };
     let exact = NAMES
         .iter()
-        .find_map(|name| named(name))
+        .find_map(|name| named(name).filter(may_be))
         .or_else(|| NAMES.iter().find_map(|name| with_unit(name)));
     let like = || {
         columns
             .iter()
             .position(|column| is_time_name(&column.own_name))
-            .filter(|_| !is_certain)
+            .filter(|i| !is_certain && may_be(i))
     };
     exact
         .or_else(like)
@@ -190,17 +197,6 @@ fn by_unit(columns: &[Column], samples: &[&[String]]) -> Option<usize> {
     is_it.then_some(0)
 }
 
-/// The offset that a name states, as `Date Time, GMT-07:00` and `Time (UTC +1)`.
-fn offset_in(name: &str) -> Option<String> {
-    let at = name.find("GMT").or(name.find("UTC"))?;
-    let text: String = name[at + 3..]
-        .trim_start()
-        .chars()
-        .take_while(|c| c.is_ascii_digit() || "+-:".contains(*c))
-        .collect();
-    civil::offset(&text).map(|_| text)
-}
-
 /// How times of these columns are written, by what is said and by a sample of their cells (joined by a space). `are_hours`: whether the
 /// second column has hours behind a date ([`parts::are_hours`](crate::parts::are_hours)).
 pub(crate) fn clock(
@@ -214,12 +210,11 @@ pub(crate) fn clock(
     let cells: Vec<&str> = plain.iter().map(AsRef::as_ref).collect();
     let marks = Some(marks);
     let mut zone_text = dialect.time_zone.clone();
-    let is_epw = dialect.format.as_deref() == Some("EPW");
     let syntax = if names.len() > 1
         && dialect.time_format.is_none()
         && let Some(meaning) = parts(names, sample)
     {
-        Syntax::Parts(meaning, is_epw)
+        Syntax::Parts(meaning, dialect.format.as_deref() == Some("EPW"))
     } else if let Some(found) = dated_hours(names, sample, are_hours, dialect.time_format.as_deref()) {
         found?
     } else {
@@ -273,7 +268,7 @@ pub(crate) fn clock(
         _ => false,
     };
     if is_dated && !has_offset && zone_text.is_none() {
-        zone_text = names.iter().find_map(|name| offset_in(name));
+        zone_text = names.iter().find_map(|name| guess::offset_in(name));
         dialect.time_zone.clone_from(&zone_text);
     }
     let scale = match &syntax {
@@ -342,7 +337,13 @@ fn dated_hours(names: &[&str], sample: &[String], are_hours: Option<bool>, forma
     if is_alone && are_hours.is_some() {
         behind.push(Part::Hour);
     }
-    if behind.is_empty() || behind.len() + 1 != names.len() {
+    // `Heure` may have whole times of day, as `21h30` and `21:30`.
+    let is_of_day = |text: &String| {
+        text.rsplit(' ')
+            .next()
+            .is_some_and(|last| civil::of_day(last).is_some())
+    };
+    if behind.is_empty() || behind.len() + 1 != names.len() || sample.first().is_some_and(is_of_day) {
         return None;
     }
     let date = |text: &String| {

@@ -49,7 +49,10 @@ pub(crate) struct Layout {
 /// Fills what is not said, and finds the line of names.
 pub(crate) fn detect(head: &Head, dialect: &mut Dialect) -> Result<Layout, Error> {
     known::recognise(&head.lines, dialect);
-    let mark = dialect.comment.get_or_insert_with(|| "#".to_owned()).clone();
+    let mark = dialect
+        .comment
+        .get_or_insert_with(|| marks::of_comments(&head.lines).to_owned())
+        .clone();
     let is_comment = |line: &str| !mark.is_empty() && line.starts_with(mark.as_str());
     let mut lines: Vec<(u64, &str)> = head
         .lines
@@ -257,7 +260,8 @@ fn layout(
         Some(data) => {
             let mut header = data - 1;
             // A row of gaps is no line of names.
-            let is_gap = |i: &usize| looks[*i].iter().all(|look| *look == Look::Missing);
+            let is_ruled = |i: usize| split.delimiter == Delimiter::Byte(b'|') && marks::is_ruler(&rows[i].1);
+            let is_gap = |i: &usize| looks[*i].iter().all(|look| *look == Look::Missing) && !is_ruled(*i);
             let above = (0..header).rev().find(|i| !is_gap(i));
             let above = above.filter(|i| looks[*i].len() >= count && looks[*i].contains(&Look::Text));
             if is_gap(&header) {
@@ -317,6 +321,17 @@ fn layout(
                     mend: "say --no-header, and --skip with the number of lines above; or what separates cells with --delimiter",
                 });
             }
+            let is_numeric = |look: &Look| matches!(look, Look::Number | Look::Time);
+            let may_be_row = |i: usize| {
+                let row = &looks[i];
+                row.len() >= 2
+                    && is_numeric(&row[0])
+                    && row[1..].iter().any(is_numeric)
+                    && row.len() == looks[i - 1].len()
+            };
+            if let Some(first) = (1..header.saturating_sub(2)).find(|i| (*i..i + 3).all(may_be_row)) {
+                return Err(several_tables(rows[first].0));
+            }
             dialect.skip = Some(lines_before(rows[header].0));
             let mut found = from_header(rows, header, dialect);
             if let (Some((_, names)), Some((_, above))) = (&mut found.names, header.checked_sub(1).map(|i| &rows[i])) {
@@ -328,6 +343,15 @@ fn layout(
             dialect.skip = Some(0);
             Ok(from_header(rows, 0, dialect))
         }
+    }
+}
+
+/// Rows above the line of names, which would be left out as settings are.
+fn several_tables(line: u64) -> Error {
+    Error::Line {
+        place: Place { line, row: 0 },
+        problem: "rows of numbers stand above the line of names, as if this were a table before another".to_owned(),
+        mend: "make a file of each table; if these are settings, say --skip with the number of lines above the names",
     }
 }
 

@@ -50,6 +50,10 @@ const MONTHS: Problem = (
     "may be a month whose digits have no marks",
     "say --time-format %Y%m, or --time-format s if these are seconds",
 );
+const CUT: Problem = (
+    "has lost its last digits, as spreadsheets show large numbers",
+    "export the column as whole numbers; or say its unit, as --time-format ms, to take it as it is",
+);
 const MIXED: Problem = (
     "is a time of another unit than others of the column",
     "write all in one unit, or say the unit with --time-format, as ms",
@@ -103,6 +107,9 @@ pub(crate) fn of_numbers(names: &[&str], cells: &[&str], unit: Unit) -> Option<P
         return Some(MIXED);
     } else if largest(cells) > SECONDS_OF_2200 * 10_f64.powi(i32::from(unit.decimals())) {
         return Some(FAR);
+    }
+    if cells.iter().any(|cell| has_lost_digits(cell, unit)) {
+        return Some(CUT);
     }
     if may_be_compact(names, cells) {
         return Some(COMPACT);
@@ -211,6 +218,18 @@ fn may_be_parts_of_a_day(names: &[&str], cells: &[&str]) -> bool {
     let is_short = steps().all(|step| step < 1.01 / 96.0) && steps().any(|step| step > 0.0);
     let begins_anew = steps().any(|step| step < -0.5);
     (is_short || begins_anew) && [1440, 86_400].iter().any(|parts| are_rounded_parts(cells, *parts))
+}
+
+/// Whether a time since 1970 is written with an exponent and so few digits that it is told to ten seconds at best.
+fn has_lost_digits(cell: &str, unit: Unit) -> bool {
+    let Some((digits, exponent)) = cell.split_once(['e', 'E']) else {
+        return false;
+    };
+    let last = exponent.parse::<i32>().unwrap_or(0)
+        - digits
+            .split_once(['.', ','])
+            .map_or(0, |(_, places)| places.len() as i32);
+    last > i32::from(unit.decimals()) && cell.replacen(',', ".", 1).parse::<f64>().is_ok_and(|x| x > 1e8)
 }
 
 /// Number of decimals of a plain number.

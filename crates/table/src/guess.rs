@@ -93,6 +93,24 @@ pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Doubt>> {
     }
 }
 
+/// Whether more than a quarter of the numbers are below the one before.
+pub(crate) fn goes_back(sample: &[String]) -> bool {
+    let numbers: Vec<f64> = sample.iter().filter_map(|cell| cell.parse().ok()).collect();
+    let backward = numbers.windows(2).filter(|pair| pair[1] < pair[0]).count();
+    4 * backward > numbers.len()
+}
+
+/// The offset that a name states, as `Date Time, GMT-07:00` and `Time (UTC +1)`.
+pub(crate) fn offset_in(name: &str) -> Option<String> {
+    let at = name.find("GMT").or(name.find("UTC"))?;
+    let text: String = name[at + 3..]
+        .trim_start()
+        .chars()
+        .take_while(|c| c.is_ascii_digit() || "+-:".contains(*c))
+        .collect();
+    civil::offset(&text).map(|_| text)
+}
+
 /// The three numbers at the beginning of a date with marks between them, and whether each has two digits at most.
 pub(crate) fn three(cell: &str) -> Option<([i64; 3], bool)> {
     let (first, first_count, rest) = digits(cell.trim(), 4)?;

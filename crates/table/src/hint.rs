@@ -43,7 +43,7 @@ pub(crate) fn hint(text: &str) -> &'static str {
     } else if plain && commas == 1 && points == 0 {
         "if it has a decimal comma, say --decimal , (and --delimiter ';' or tab)"
     } else if plain && (commas > 1 || (commas == 1 && points == 1)) {
-        if text.rfind(',') > text.rfind('.') {
+        if points > 0 && text.rfind(',') > text.rfind('.') {
             "say --decimal , --thousands ."
         } else {
             "say --thousands ,"
@@ -57,6 +57,8 @@ pub(crate) fn hint(text: &str) -> &'static str {
     } else if text.len() > 1 && text.bytes().all(|c| c.is_ascii_hexdigit()) {
         "if a unit stands behind the number, say --strip-units; hexadecimal numbers are not read: convert the column, or leave it out with \
          --without"
+    } else if text.ends_with(FLAGS) {
+        "if a mark stands behind the number, --strip-units cuts it off"
     } else if text.ends_with('%') || text.ends_with(|c: char| c.is_alphabetic()) && !text.contains('x') {
         "if a unit stands behind the number, say --strip-units"
     } else if text.starts_with("0x") || text.starts_with("0X") {
@@ -74,6 +76,9 @@ fn begins_with_zeros(text: &str) -> bool {
 
 /// Signs that may stand before a number.
 const CURRENCIES: [char; 4] = ['$', '€', '£', '¥'];
+
+/// Marks that tables put behind numbers that are estimated, revised or doubtful.
+const FLAGS: [char; 7] = ['*', '!', '#', '^', '~', '?', '<'];
 
 /// Whether a text is likely a number of another spelling, with groups, a decimal comma or a unit.
 pub(crate) fn looks_like_number(text: &str) -> bool {
@@ -100,7 +105,9 @@ pub(crate) fn looks_like_number(text: &str) -> bool {
     let has_unit = without_unit(size).is_some_and(|(number, unit)| {
         let is_spaced = size.as_bytes().get(number.len()) == Some(&b' ');
         number.parse::<f64>().is_ok()
-            && (unit.starts_with(['%', '°', 'µ']) || (is_spaced && unit.len() <= 6 && !unit.contains(' ')))
+            && (unit.starts_with(['%', '°', 'µ'])
+                || unit.chars().all(|c| FLAGS.contains(&c))
+                || (is_spaced && unit.len() <= 6 && !unit.contains(' ')))
     });
     is_plain || has_unit
 }

@@ -10,8 +10,13 @@ const MAX_DEPTH: usize = 16;
 
 /// The keys and the text of all scalars of an object, in their order. `null` is an empty text.
 pub(crate) fn flattened(line: &str, number: u64) -> Result<Vec<(String, String)>, Error> {
+    // The lines of a list may end in its commas.
+    let line = line.trim_end();
     let mut reader = Reader {
-        text: line.as_bytes(),
+        text: line
+            .strip_suffix("},")
+            .map_or(line, |_| &line[..line.len() - 1])
+            .as_bytes(),
         at: 0,
     };
     let mut pairs = Vec::new();

@@ -59,6 +59,7 @@ mod extent;
 mod guess;
 mod head;
 mod hint;
+mod influx;
 mod interval;
 mod json;
 mod known;

@@ -223,8 +223,18 @@ impl Split {
             let from = row.text.len();
             if text.get(at) == Some(&self.quote) {
                 at += 1;
+                let mut is_inner = false;
                 loop {
                     match (text.get(at), text.get(at + 1)) {
+                        // A quote behind a backslash, as of MySQL; but `"C:\dir\"` ends with one.
+                        (Some(b'\\'), Some(c))
+                            if *c == self.quote
+                                && (is_inner || text.get(at + 2).is_some_and(|c| !is_end(*c) && *c != self.quote)) =>
+                        {
+                            row.text.push(self.quote);
+                            is_inner = !is_inner;
+                            at += 2;
+                        }
                         (None, _) => {
                             row.text = text;
                             return true;

@@ -30,6 +30,15 @@ pub(crate) fn has_decimal_commas(rows: &[(u64, Vec<String>)]) -> bool {
     certain && !points
 }
 
+/// The mark of comments: `//` or `% ` if the first line is one.
+pub(crate) fn of_comments(lines: &[(u64, String)]) -> &'static str {
+    match lines.first() {
+        Some((_, first)) if first.starts_with("//") => "//",
+        Some((_, first)) if first.starts_with("% ") => "%",
+        _ => "#",
+    }
+}
+
 /// The digits before an exponent, as of `1,5E-03`.
 fn without_exponent(size: &str) -> &str {
     match size.split_once(['e', 'E']) {

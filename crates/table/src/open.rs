@@ -10,7 +10,7 @@ use crate::lines::{Lines, Row, Split};
 use crate::profile::Profile;
 use crate::rows::Rows;
 use crate::table::Table;
-use crate::{known, labelled, names, source};
+use crate::{influx, known, labelled, names, source};
 use std::io::{BufRead, Cursor, Read};
 
 impl Table {
@@ -60,8 +60,12 @@ impl Table {
         };
         let (rows, columns) = if is_object {
             of_json(&head, reader, &mut dialect)?
+        } else if said.delimiter.is_none() && influx::has_topics(&head) {
+            of_keys(&head, reader, &mut dialect, "JSON behind topics", influx::topic_pairs)?
         } else if is_labelled() {
             of_keys(&head, reader, &mut dialect, "names before cells", labelled::pairs)?
+        } else if said.delimiter.is_none() && said.skip.is_none() && influx::is_protocol(&head) {
+            of_keys(&head, reader, &mut dialect, "InfluxDB line protocol", influx::pairs)?
         } else {
             of_text(&head, reader, &mut dialect, said)?
         };

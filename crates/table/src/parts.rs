@@ -1,7 +1,9 @@
 //! Dates in several columns: which columns give one, and what each of them means.
 
 use crate::column::Column;
-use crate::time::SECOND;
+use crate::time::{SECOND, Unit};
+use crate::written::{NO_TIME, Problem, number};
+use jiff::civil::Date;
 
 /// Meaning of a column of a part of a date.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,6 +18,103 @@ pub(crate) enum Part {
     DayOfYear,
     /// A time of day, as `21:30` or `2130`.
     OfDay,
+    /// Weeks since 6 January 1980, as receivers of satellites count them.
+    Week,
+    /// Units of a second of so many decimals in such a week.
+    OfWeek(u8),
+}
+
+impl Part {
+    /// The place among year, month, day, hour, minute and second.
+    pub(crate) fn index(self) -> Option<usize> {
+        let all = [
+            Self::Year,
+            Self::Month,
+            Self::Day,
+            Self::Hour,
+            Self::Minute,
+            Self::Second,
+        ];
+        all.iter().position(|part| *part == self)
+    }
+}
+
+/// A name without marks and without the unit in brackets.
+fn letters(name: &str) -> String {
+    let name = name.split(['[', '(']).next().unwrap_or(name).to_lowercase();
+    name.chars().filter(|c| c.is_alphanumeric()).collect()
+}
+
+/// Whether two names are those of the week of GPS and of the seconds, or thousandths, of the week.
+fn week_parts(week: &str, of_week: &str) -> Option<Vec<Part>> {
+    const WEEKS: [&str; 6] = ["week", "gpsweek", "gpswk", "wn", "gpswn", "gpsweeknumber"];
+    const SECONDS: [&str; 13] = [
+        "tow",
+        "gpstow",
+        "sow",
+        "gpssow",
+        "gpsseconds",
+        "gpssecond",
+        "gpssec",
+        "gpssecs",
+        "secondsofweek",
+        "gpssecondsofweek",
+        "timeofweek",
+        "gpstimeofweek",
+        "weekseconds",
+    ];
+    let name = letters(of_week);
+    let is_named = |name: &str| SECONDS.contains(&name);
+    let is_thousandths = of_week.to_lowercase().contains("[ms]") || of_week.to_lowercase().contains("(ms)");
+    let decimals = match name.as_str() {
+        "itow" | "gpsms" | "weekms" | "gpsmilliseconds" => 3,
+        name if is_named(name) => {
+            if is_thousandths {
+                3
+            } else {
+                0
+            }
+        }
+        name => name.strip_suffix("ms").filter(|name| is_named(name)).map(|_| 3)?,
+    };
+    WEEKS
+        .contains(&letters(week).as_str())
+        .then(|| vec![Part::Week, Part::OfWeek(decimals)])
+}
+
+/// The columns of weeks of GPS and of the seconds in them, side by side.
+pub(crate) fn weeks(columns: &[Column]) -> Option<Vec<usize>> {
+    let is_pair = |i: &usize| week_parts(&columns[*i].own_name, &columns[*i + 1].own_name).is_some();
+    (0..columns.len().saturating_sub(1))
+        .find(is_pair)
+        .map(|i| vec![i, i + 1])
+}
+
+/// The day, the second and its parts by the clock of GPS, which has no leap seconds.
+pub(crate) fn of_week(week: &str, of_week: &str, decimals: u8) -> Result<(Date, i64, i128), Problem> {
+    let unit = if decimals == 0 {
+        Unit::Seconds
+    } else {
+        Unit::Milliseconds
+    };
+    let week = week.trim().parse::<i64>().map_err(|_| NO_TIME)?;
+    if (0..1024).contains(&week) {
+        return Err((
+            "has a week of GPS before August 1999, or one that is counted modulo 1024",
+            "add the weeks of the earlier rounds, 1024 or 2048, to the column, or convert it to dates",
+        ));
+    }
+    let since = number(of_week.trim(), unit)?;
+    let day = since.0.div_euclid(86_400 * SECOND);
+    if !(0..7).contains(&day) {
+        return Err(NO_TIME);
+    }
+    let days = jiff::Span::new().try_days(week.saturating_mul(7).saturating_add(day as i64));
+    let date = days
+        .and_then(|days| Date::constant(1980, 1, 6).checked_add(days))
+        .map_err(|_| NO_TIME)?;
+    let rest = since.0.rem_euclid(86_400 * SECOND);
+    Ok((date, (rest / SECOND) as i64, rest % SECOND))
 }
 
 /// The part of a date that a name means, behind the parts of other columns.
@@ -70,6 +169,11 @@ pub(crate) fn monthly(columns: &[Column]) -> Option<[usize; 2]> {
 
 /// Meanings of columns that give a date together, by their names, or by their cells.
 pub(crate) fn parts(names: &[&str], sample: &[String]) -> Option<Vec<Part>> {
+    if let [week, of_week] = names
+        && let Some(found) = week_parts(week, of_week)
+    {
+        return Some(found);
+    }
     let mut found = Vec::new();
     for name in names {
         match part(name, &found) {

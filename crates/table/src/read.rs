@@ -60,9 +60,17 @@ impl Table {
                     mend: "make a file of its own of this line and all behind it",
                 };
             }
+            let is_other = is_of_row && !is_moved && self.rows.begins_another_table(&self.row);
+            if is_other {
+                error = Error::Line {
+                    place: self.own_place(self.place()),
+                    problem: "another line of names: a further table begins here".to_owned(),
+                    mend: "make a file of its own of this line and all behind it",
+                };
+            }
             if is_of_row && self.rows.is_preamble(&self.row) {
                 self.skipped.repeated += 1;
-            } else if is_of_row && !is_moved && self.skipped.bad < self.dialect.skip_bad {
+            } else if is_of_row && !is_moved && !is_other && self.skipped.bad < self.dialect.skip_bad {
                 self.skip(&error);
             } else if batch.rows > 0 {
                 self.late_error = Some(error);
@@ -107,7 +115,7 @@ impl Table {
                 let cell = scanner.cells[*column];
                 let gaps = &self.gaps[*column];
                 match (&mut batch.columns[i], cell.number) {
-                    (Cells::Numbers(numbers), Some((value, _))) => {
+                    (Cells::Numbers(numbers), Some((value, _))) if !self.dialect.strip_units => {
                         numbers.push(Some(value).filter(|_| !gaps.has_numbers() || !gaps.has_number(value)));
                     }
                     (Cells::Numbers(numbers), None) if cell.is_empty() => numbers.push(None),
@@ -175,6 +183,18 @@ impl Table {
                 *problem = "has NUL bytes, as after a loss of power";
                 "leave such lines out with --skip-bad".clone_into(mend);
             }
+            _ => {}
+        }
+        const MARKS: [(&[u8], &str); 4] = [
+            (b"//", "if such lines are comments, say --comment //"),
+            (b"%", "if such lines are comments, say --comment %"),
+            (b";", "if such lines are comments, say --comment ';'"),
+            (b"!", "if such lines are comments, say --comment !"),
+        ];
+        let said = MARKS.iter().find(|(mark, _)| self.row.cell(0).starts_with(mark));
+        match (&mut error, said) {
+            (Error::Line { mend, .. }, Some((_, said))) => *mend = said,
+            (Error::Cell { mend, .. }, Some((_, said))) => (*said).clone_into(mend),
             _ => {}
         }
         if let Error::Line { place, .. } | Error::Cell { place, .. } = &mut error {
@@ -249,7 +269,9 @@ impl Table {
                     numbers.push(None);
                     continue;
                 }
-                if let Ok(Number::Double(value, _)) = number::parse(cell, self.syntax) {
+                if let (false, Ok(Number::Double(value, _))) =
+                    (self.dialect.strip_units, number::parse(cell, self.syntax))
+                {
                     let gaps = &self.gaps[*column];
                     numbers.push(Some(value).filter(|_| !gaps.has_numbers() || !gaps.has_number(value)));
                     continue;

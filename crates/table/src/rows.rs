@@ -4,6 +4,7 @@ use crate::dialect::{Delimiter, Dialect};
 use crate::error::{Error, Place};
 use crate::json::{self, Keys};
 use crate::lines::{Line, Lines, Row, Split};
+use crate::missing;
 use crate::number;
 use crate::plain::Scanner;
 #[cfg(feature = "parquet")]
@@ -11,6 +12,14 @@ use std::io::Cursor;
 
 /// The mark of UTF-8.
 const MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// Whether a line is the number of rows that programs of databases write below them, as `(60 rows)`.
+fn is_row_count(text: &[u8]) -> bool {
+    let number = text
+        .strip_prefix(b"(")
+        .and_then(|text| text.strip_suffix(b" rows)").or(text.strip_suffix(b" row)")));
+    number.is_some_and(|number| !number.is_empty() && number.iter().all(u8::is_ascii_digit))
+}
 
 /// Rows of a text.
 pub(crate) struct Rows {
@@ -61,6 +70,9 @@ impl Rows {
             }
             if !row.text.is_empty() && row.text.iter().all(|c| matches!(c, 0x1a | 0x0c)) {
                 // The end of a file of DOS, and of a printed page.
+                continue;
+            }
+            if is_row_count(&row.text) {
                 continue;
             }
             if let Some(keys) = &self.keys {
@@ -130,6 +142,16 @@ impl Rows {
         };
         let length = self.header.len();
         length > 1 && row.cells.len() == length && sorted(row.texts()) == sorted(self.header.clone())
+    }
+
+    /// Whether a row is another line of names: it begins with the first name, and all cells are words.
+    pub(crate) fn begins_another_table(&self, row: &Row) -> bool {
+        let is_name = |i: usize| {
+            let text = row.cell_text(i);
+            text.starts_with(char::is_alphabetic) && !missing::is_usual(text, true) && text.parse::<f64>().is_err()
+        };
+        let is_first = |name: &String| !name.is_empty() && row.cell(0) == name.as_bytes();
+        row.cells.len() > 1 && (0..row.cells.len()).all(is_name) && self.header.first().is_some_and(is_first)
     }
 
     /// Whether a row is one of the lines before the data, as in files that were joined.

@@ -2,6 +2,7 @@
 
 use crate::clock::{self, Refused};
 use crate::error::{Error, Place, printable};
+use crate::guess;
 use crate::interval;
 use crate::names;
 use crate::parts;
@@ -79,9 +80,8 @@ impl Table {
         }
         let sample = self.profiles.first().map_or(&[][..], |profile| &profile.sample);
         let numbers: Vec<f64> = sample.iter().filter_map(|cell| cell.parse().ok()).collect();
-        let backward = numbers.windows(2).filter(|pair| pair[1] < pair[0]).count();
         let is_still = numbers.len() > 2 && numbers.iter().all(|x| *x == numbers[0]);
-        if numbers.len() == sample.len() && (is_still || 4 * backward > numbers.len()) {
+        if numbers.len() == sample.len() && (is_still || guess::goes_back(sample)) {
             return Err(Error::NoTime {
                 column: printable(&self.columns[0].name),
             });

@@ -5,7 +5,7 @@ use crate::civil::{self, Zone, offset};
 pub(crate) use crate::civil::{AMBIGUOUS, NO_SUCH_DATE, Order, Problem};
 use crate::interval;
 use crate::number;
-use crate::parts::{Part, joined, padded, parts_of_second};
+use crate::parts::{Part, joined, of_week, padded, parts_of_second};
 use crate::quick;
 use crate::time::{DECIMALS, SECOND, Scale, Time, Unit};
 use jiff::civil::{Date, DateTime};
@@ -97,13 +97,6 @@ pub(crate) fn since(format: &str) -> Option<(Syntax, Scale)> {
         "labview" => (Syntax::Since(1, -2_082_844_800), Scale::Utc),
         unit => (Syntax::Since(interval::seconds(unit)?, 0), Scale::Seconds),
     })
-}
-
-/// Seconds since 1970 of a date and a second of the day, as if it were UTC.
-fn civil_seconds(date: Date, second: i64) -> i64 {
-    let epoch = Date::constant(1970, 1, 1);
-    let days = date.since(epoch).map_or(0, |span| i64::from(span.get_days()));
-    days * 86_400 + second
 }
 
 /// Reads the times of a column.
@@ -247,7 +240,7 @@ impl Clock {
 
     /// A civil time on its clock: with its own offset, that of the zone, or none.
     pub(crate) fn placed(&self, date: Date, second: i64, fraction: i128, zone: &Zone) -> Result<Time, Problem> {
-        let seconds = civil_seconds(date, second);
+        let seconds = civil::seconds(date, second);
         match (zone, &self.zone, self.scale) {
             (Zone::Unknown, ..) => Err(NO_TIME),
             (Zone::Offset(offset), _, Scale::Utc) => Ok(Time::checked(seconds - offset, fraction)),
@@ -311,7 +304,7 @@ impl Clock {
                 .ok_or(refused)?,
         };
         match parsed.offset() {
-            Some(offset) => Ok(Time::checked(civil_seconds(date, second) - i64::from(offset.seconds()), fraction)),
+            Some(offset) => Ok(Time::checked(civil::seconds(date, second) - i64::from(offset.seconds()), fraction)),
             None => self.placed(date, second, fraction, &Zone::Nothing),
         }
     }
@@ -334,6 +327,10 @@ impl Clock {
             Syntax::Format(format) if !format.contains("%M") => return self.formatted(&cells.join(" "), format),
             _ => return self.parse(&joined(cells)),
         };
+        if let ([Part::Week, Part::OfWeek(decimals)], [week, behind]) = (meaning.as_slice(), cells) {
+            let (date, second, parts) = of_week(week, behind, *decimals)?;
+            return self.placed(date, second, parts, &Zone::Nothing);
+        }
         let (mut parts, mut fraction) = ([0_i64, 1, 1, 0, 0, 0], 0);
         let (mut day_of_year, mut of_day) = (None, 0);
         for (cell, part) in cells.iter().zip(meaning) {
@@ -357,7 +354,7 @@ impl Clock {
             match part {
                 Part::DayOfYear => day_of_year = Some(whole),
                 Part::Second => (parts[5], fraction) = (whole, rest),
-                _ => parts[*part as usize] = whole,
+                _ => parts[part.index().ok_or(NO_TIME)?] = whole,
             }
         }
         let [year, month, day, hour, minute, second] = parts;

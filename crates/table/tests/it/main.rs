@@ -16,6 +16,7 @@ mod long;
 mod parquet;
 mod plain;
 mod random;
+mod recordings;
 mod spellings;
 mod strangers;
 mod times;

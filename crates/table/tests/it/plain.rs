@@ -84,7 +84,16 @@ fn table(text: &str, said: &Dialect, time: Option<&str>) -> Table {
 fn all(text: &str, said: &Dialect, time: Option<&str>, limit: usize) -> Vec<String> {
     let mut table = table(text, said, time);
     let (mut found, mut batch) = (Vec::new(), Batch::default());
-    while table.read(&mut batch, limit).unwrap() > 0 {
+    loop {
+        match table.read(&mut batch, limit) {
+            Ok(0) => break,
+            Ok(_) => {}
+            // Another line of names is not left out.
+            Err(error) => {
+                found.push(error.to_string());
+                continue;
+            }
+        }
         for row in 0..batch.rows {
             let cells: Vec<String> = batch.columns.iter().map(|column| bits(column)[row].clone()).collect();
             found.push(format!("{:?} {:?} {cells:?}", batch.places[row], batch.times.get(row)));
