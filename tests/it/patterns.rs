@@ -4,8 +4,9 @@
 use crate::references::agree;
 use fewbits::binary_patterns::search::{Descent, LinearSearch, free_breakpoints};
 use fewbits::binary_patterns::{
-    BinaryQuantizer, CellGrid, Mask, Pattern, PatternSensor, Source, gray_basis, linear_pattern, rank,
+    BinaryQuantizer, Mask, Pattern, PatternSensor, Source, gray_basis, linear_pattern, rank, uniform_cells,
 };
+use fewbits::quantizers::Quantizer;
 use fewbits::sensor_assignment::{CodedSensors, Estimator, exchange, pair_costs};
 use fewbits_baselines::binary_patterns::{AdaptiveRule, adaptive, printed_gaussian_cells};
 use fewbits_baselines::sensor_assignment::all_errors;
@@ -14,18 +15,18 @@ use fewbits_experiments::reference;
 /// A source, its cells and the noise at one signal-to-noise ratio in dB.
 struct Scene {
     source: Source,
-    grid: CellGrid,
+    grid: Quantizer,
     noise: f64,
 }
 
 impl Scene {
-    fn new(source: Source, grid: CellGrid, snr: f64) -> Self {
+    fn new(source: Source, grid: Quantizer, snr: f64) -> Self {
         let noise = source.noise_deviation(snr).unwrap();
         Self { source, grid, noise }
     }
 
     fn uniform(bits: usize, snr: f64) -> Self {
-        Self::new(Source::uniform(1.0).unwrap(), CellGrid::uniform(1.0, bits).unwrap(), snr)
+        Self::new(Source::uniform(1.0).unwrap(), uniform_cells(1.0, bits).unwrap(), snr)
     }
 
     fn gaussian(snr: f64) -> Self {
@@ -38,7 +39,7 @@ impl Scene {
     }
 
     fn quantizers(&self, masks: impl IntoIterator<Item = Mask>) -> Vec<BinaryQuantizer> {
-        let bits = self.grid.bits().unwrap();
+        let bits = self.grid.cells().trailing_zeros() as usize;
         let quantizer = |m| linear_pattern(m, bits).unwrap().on(&self.grid).unwrap();
         masks.into_iter().map(quantizer).collect()
     }
@@ -137,7 +138,7 @@ fn free(scene: &Scene, sensors: usize, jitter: f64) -> [f64; 2] {
     let any = search.any_rank().best().unwrap();
     let mut starts = vec![scene.quantizers(linear.masks.clone()), scene.quantizers(any.masks)];
     if sensors > 3 {
-        let grid = CellGrid::uniform(1.0, 4).unwrap();
+        let grid = uniform_cells(1.0, 4).unwrap();
         let fine = Scene { grid, ..*scene };
         starts.push(fine.quantizers(fine.search(sensors).any_rank().best().unwrap().masks));
         starts.push(any_patterns(scene, &linear.masks).0);

@@ -4,7 +4,7 @@
 
 use divan::Bencher;
 use fewbits_binary_patterns::search::LinearSearch;
-use fewbits_binary_patterns::{BinaryQuantizer, CellGrid, Source};
+use fewbits_binary_patterns::{BinaryQuantizer, Source, uniform_cells};
 use rayon::ThreadPoolBuilder;
 
 fn main() {
@@ -14,7 +14,7 @@ fn main() {
 fn search(bits: usize, sensors: usize) -> LinearSearch {
     let source = Source::uniform(1.0).unwrap();
     let noise = source.noise_deviation(18.2).unwrap();
-    LinearSearch::with_deviation(source, CellGrid::uniform(1.0, bits).unwrap(), noise, sensors).unwrap()
+    LinearSearch::with_deviation(source, uniform_cells(1.0, bits).unwrap(), noise, sensors).unwrap()
 }
 
 /// The unit: one encoding of a measurement by four thresholds.

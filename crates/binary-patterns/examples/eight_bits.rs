@@ -1,12 +1,12 @@
 //! Eight one-bit sensors about a uniform unknown: the best linear patterns, then breakpoints off the grid.
 
 use fewbits_binary_patterns::search::{LinearSearch, free_breakpoints};
-use fewbits_binary_patterns::{CellGrid, Source, bounds, linear_pattern};
+use fewbits_binary_patterns::{Source, bounds, linear_pattern, uniform_cells};
 use fewbits_core::Observation;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let source = Source::uniform(1.0)?;
-    let (grid, noise) = (CellGrid::uniform(1.0, 3)?, source.noise_deviation(18.2)?);
+    let (grid, noise) = (uniform_cells(1.0, 3)?, source.noise_deviation(18.2)?);
     let search = LinearSearch::with_deviation(source, grid, noise, 8)?;
     let best = search.best()?;
     println!("masks {:?}, squared error {:.7}", best.masks, best.mse);

@@ -2,5 +2,5 @@
 
 pub use crate::decoding::sums::{moments, squared_error};
 pub use crate::observation::source::Kind;
-pub use crate::patterns::grid::bits_in_range;
+pub use crate::patterns::grid::{bits_in_range, support};
 pub use crate::patterns::linear::{grid_bits, sensors_of};

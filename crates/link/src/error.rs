@@ -65,7 +65,7 @@ impl Error {
     }
 
     /// Whether a file could not be read or written, which may pass: a full disk, too many open files.
-    pub fn is_of_file(&self) -> bool {
+    pub(crate) fn is_of_file(&self) -> bool {
         matches!(self, Self::File { .. })
     }
 

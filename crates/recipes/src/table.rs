@@ -188,8 +188,6 @@ pub struct TableRows {
     table: Table,
     base: TimeBase,
     batch: fewbits_table::Batch,
-    /// What the codes of each column stand for.
-    integers: Vec<Option<Integers>>,
 }
 
 impl TableRows {
@@ -199,14 +197,7 @@ impl TableRows {
             table,
             base,
             batch: fewbits_table::Batch::default(),
-            integers: Vec::new(),
         }
-    }
-
-    /// States how whole numbers of each selected column are coded.
-    #[must_use]
-    pub fn with_integers(self, integers: Vec<Option<Integers>>) -> Self {
-        Self { integers, ..self }
     }
 
     /// The table.
@@ -227,14 +218,11 @@ impl TableRows {
             times::of_row(*time, self.base).map_err(|problem| time_refused(&self.table, batch, row, *time, problem))
         };
         let ticks: Vec<Option<i64>> = batch.times.iter().enumerate().map(tick).collect::<Result<_, _>>()?;
-        let cells = |index: usize| {
-            let integers = self.integers.get(index).copied().flatten();
-            match &batch.columns[index] {
-                Cells::Numbers(cells) if integers.is_none() => Ok(cells.clone()),
-                _ => (0..batch.rows)
-                    .map(|row| cell(&self.table, batch, index, row, integers))
-                    .collect(),
-            }
+        let cells = |index: usize| match &batch.columns[index] {
+            Cells::Numbers(cells) => Ok(cells.clone()),
+            _ => (0..batch.rows)
+                .map(|row| cell(&self.table, batch, index, row, None))
+                .collect(),
         };
         let columns = (0..batch.columns.len()).map(cells).collect::<Result<_, _>>()?;
         // Without a column of times there are no ticks, whatever the base is.

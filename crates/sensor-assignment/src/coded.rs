@@ -2,7 +2,7 @@
 
 use crate::Error;
 use fewbits_binary_patterns::{
-    Bank, BinaryQuantizer, CellGrid, Nodes, PatternSensor, Source, Threshold, gray_basis, linear_pattern,
+    Bank, BinaryQuantizer, Nodes, PatternSensor, Source, Threshold, gray_basis, linear_pattern, uniform_cells,
 };
 use fewbits_core::Observation;
 use fewbits_numerics::error::{entries, positive, refuse};
@@ -61,7 +61,7 @@ impl CodedSensors {
         }
         let noise_deviations = deviations.to_vec();
         let source = Source::uniform(half_width)?;
-        let grid = CellGrid::uniform(half_width, sensors)?;
+        let grid = uniform_cells(half_width, sensors)?;
         let quantizers = gray_basis(sensors)?
             .into_iter()
             .map(|mask| linear_pattern(mask, sensors)?.on(&grid))
@@ -245,7 +245,7 @@ mod tests {
         let sensors = CodedSensors::with_variances(1.3, &[0.04, 0.2, 0.01, 0.08]).unwrap();
         let assignment = [2, 0, 3, 1];
         let bank = sensors.bank(&assignment).unwrap();
-        let grid = CellGrid::uniform(1.3, 4).unwrap();
+        let grid = uniform_cells(1.3, 4).unwrap();
         // The centre decoder as a table over outcomes.
         let mut exact = 0.0;
         let nodes = bank.fine_nodes();

@@ -1,10 +1,11 @@
 //! The thesis's decoders of the bits of all sensors, as tables, and their exact errors.
 
-use fewbits_binary_patterns::engine::Kind;
-use fewbits_binary_patterns::{Bank, CellGrid, Error, LookupTable, Nodes};
+use fewbits_binary_patterns::engine::{Kind, support};
+use fewbits_binary_patterns::{Bank, Error, LookupTable, Nodes};
 use fewbits_numerics::golden::maximum;
 use fewbits_numerics::normal::log_pdf;
 use fewbits_quantizer_design::outcomes::{Table, for_each_log};
+use fewbits_quantizers::Quantizer;
 
 /// Smaller probabilities are replaced by this before their logarithm is multiplied by a count, which may be zero.
 const FLOOR: f64 = 1e-300;
@@ -27,12 +28,12 @@ pub enum Decoder<'a> {
     /// Centroid of the cell `l` that maximises `ln P(c_l) + sum_n ln P(z_n|c_l)`. This is equation 5.10 with the missing division of
     /// `P(z_n, c_l)` by `P(c_l)` (erratum `binary-4`). The bits are treated as independent given the cell, but they are independent
     /// only given `X` (erratum `binary-5`).
-    DiscreteMap(&'a CellGrid),
+    DiscreteMap(&'a Quantizer),
     /// Equation 5.10 as printed, with joint in place of conditional probabilities. Equal to [`Self::DiscreteMap`] for
     /// equally likely cells; up to three times its error for a Gaussian source.
-    PrintedDiscreteMap(&'a CellGrid),
+    PrintedDiscreteMap(&'a Quantizer),
     /// Centroid of the cell of greatest posterior probability `int_cell p(x) prod_n P(z_n|x) dx`.
-    ExactDivisionMap(&'a CellGrid),
+    ExactDivisionMap(&'a Quantizer),
     /// The `x` in the support that maximises `ln p(x) + sum_n ln P(z_n|x)`; the midpoint of a plateau, the lowest of equal maxima.
     ContinuousMap,
 }
@@ -74,8 +75,8 @@ struct Cell {
 }
 
 /// Nodes with breaks at the edges of `grid`, for each cell.
-fn cells(bank: &Bank, grid: &CellGrid) -> Vec<Cell> {
-    let supports = (0..grid.cells()).filter_map(|cell| grid.support(cell, bank.source()));
+fn cells(bank: &Bank, grid: &Quantizer) -> Vec<Cell> {
+    let supports = (0..grid.cells()).filter_map(|cell| support(grid, cell, bank.source()));
     let cell = |(low, high): (f64, f64)| {
         let nodes = bank.nodes_between(low, high);
         let mass = nodes.expectation(|_| 1.0);
@@ -90,7 +91,7 @@ fn cells(bank: &Bank, grid: &CellGrid) -> Vec<Cell> {
 }
 
 /// `scaled` makes of the joint probability of bit and cell, and that of the cell, what is multiplied over the sensors.
-fn division_map(bank: &Bank, grid: &CellGrid, scaled: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+fn division_map(bank: &Bank, grid: &Quantizer, scaled: impl Fn(f64, f64) -> f64) -> Vec<f64> {
     let cells = cells(bank, grid);
     let log = |p: f64| p.max(FLOOR).ln();
     let tables = bank.groups().map(|(sensor, count)| {
@@ -112,7 +113,7 @@ fn division_map(bank: &Bank, grid: &CellGrid, scaled: impl Fn(f64, f64) -> f64) 
     estimates
 }
 
-fn exact_division_map(bank: &Bank, grid: &CellGrid, outcomes: usize) -> Vec<f64> {
+fn exact_division_map(bank: &Bank, grid: &Quantizer, outcomes: usize) -> Vec<f64> {
     let cells = cells(bank, grid);
     let (mut nodes, mut ends) = (Nodes::default(), Vec::with_capacity(cells.len()));
     for cell in &cells {

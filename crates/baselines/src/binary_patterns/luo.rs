@@ -4,7 +4,9 @@ use fewbits_binary_patterns::Error;
 use fewbits_binary_patterns::Nodes;
 use fewbits_binary_patterns::engine::Kind;
 use fewbits_binary_patterns::engine::bits_in_range;
-use fewbits_binary_patterns::{Bank, BinaryQuantizer, CellGrid, PatternSensor, Source, linear_pattern, natural_basis};
+use fewbits_binary_patterns::{
+    Bank, BinaryQuantizer, PatternSensor, Source, linear_pattern, natural_basis, uniform_cells,
+};
 use fewbits_numerics::error::{positive, refuse};
 use fewbits_numerics::quadrature::gauss_legendre;
 use fewbits_quantizer_design::outcomes::Table;
@@ -48,7 +50,7 @@ impl Luo {
         if allocation.contains(&0) {
             return refuse("sensors", sensors, format!("at least {} sensors", 1usize << (bits - 1)));
         }
-        let grid = CellGrid::uniform(half_width, bits)?;
+        let grid = uniform_cells(half_width, bits)?;
         let quantizers = natural_basis(bits)?
             .into_iter()
             .map(|mask| linear_pattern(mask, bits)?.on(&grid))

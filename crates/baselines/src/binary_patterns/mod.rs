@@ -21,11 +21,12 @@ pub use separation::check_separation;
 pub use strategies::{by_information, tile, with_basis};
 
 use fewbits_binary_patterns::Error;
+use fewbits_binary_patterns::Nodes;
 use fewbits_binary_patterns::engine::Kind;
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, Source};
-use fewbits_binary_patterns::{CellGrid, Nodes};
 use fewbits_numerics::error::{at_least_one, positive};
 use fewbits_numerics::quadrature::Rule;
+use fewbits_quantizers::Quantizer;
 
 /// A bank of `sensors` sensors that all send the sign of their measurement.
 ///
@@ -44,9 +45,9 @@ const MAX_EIGHT_LEVEL_EDGES: [f64; 7] = [-1.748, -1.05, -0.5006, 0.0, 0.5006, 1.
 ///
 /// # Errors
 /// If `deviation` is not positive and finite.
-pub fn printed_gaussian_cells(deviation: f64) -> Result<CellGrid, Error> {
+pub fn printed_gaussian_cells(deviation: f64) -> Result<Quantizer, Error> {
     let deviation = positive("deviation", deviation)?;
-    CellGrid::from_breakpoints(MAX_EIGHT_LEVEL_EDGES.iter().map(|t| t * deviation).collect())
+    Quantizer::new(MAX_EIGHT_LEVEL_EDGES.iter().map(|t| t * deviation).collect())
 }
 
 /// Largest number of panels: enough for 75 dB if all of the support must be resolved.

@@ -4,8 +4,9 @@ use super::information::mean_information;
 use fewbits_binary_patterns::Error;
 use fewbits_binary_patterns::engine::{grid_bits, sensors_of};
 use fewbits_binary_patterns::search::{LinearSearch, MaskSet};
-use fewbits_binary_patterns::{Bank, CellGrid, Mask, Source};
+use fewbits_binary_patterns::{Bank, Mask, Source};
 use fewbits_numerics::error::refuse;
+use fewbits_quantizers::Quantizer;
 
 /// Number of sets that are evaluated on the fine nodes.
 const FINALISTS: usize = 16;
@@ -56,7 +57,7 @@ pub fn tile(masks: &[Mask], sensors: usize) -> Result<Vec<Mask>, Error> {
 /// are sensors.
 pub fn by_information(
     source: &Source,
-    grid: &CellGrid,
+    grid: &Quantizer,
     noise_deviation: f64,
     sensors: usize,
     forced: &[Mask],
@@ -83,12 +84,13 @@ pub fn by_information(
 mod tests {
     use super::*;
     use fewbits_binary_patterns::gray_basis;
+    use fewbits_binary_patterns::uniform_cells;
 
     #[test]
     fn forced_masks_are_kept() {
         let source = Source::uniform(1.0).unwrap();
         let noise = source.noise_deviation(4.0).unwrap();
-        let search = LinearSearch::with_deviation(source, CellGrid::uniform(1.0, 3).unwrap(), noise, 5).unwrap();
+        let search = LinearSearch::with_deviation(source, uniform_cells(1.0, 3).unwrap(), noise, 5).unwrap();
         let gray = gray_basis(3).unwrap();
         let forced = with_basis(&search, &gray).unwrap();
         assert!(gray.iter().all(|g| forced.masks.contains(g)));
@@ -113,7 +115,7 @@ mod tests {
     #[test]
     fn information_repeats_one_mask() {
         let source = Source::uniform(1.0).unwrap();
-        let grid = CellGrid::uniform(1.0, 3).unwrap();
+        let grid = uniform_cells(1.0, 3).unwrap();
         let masks = by_information(&source, &grid, source.noise_deviation(20.0).unwrap(), 5, &[4, 6, 3]).unwrap();
         assert_eq!(masks, [1, 1, 3, 4, 6]);
         assert!(by_information(&source, &grid, 0.1, 2, &[4, 6, 3]).is_err());

@@ -1,6 +1,6 @@
 //! One wrong bit: how likely it is, and where it lands.
 
-use fewbits_binary_patterns::{BinaryQuantizer, CellGrid, Error};
+use fewbits_binary_patterns::{BinaryQuantizer, Error, uniform_cells};
 use fewbits_numerics::error::refuse;
 use fewbits_sensor_assignment::engine::flipped_centre;
 
@@ -9,11 +9,11 @@ use fewbits_sensor_assignment::engine::flipped_centre;
 /// # Errors
 /// If `bit` is not below `bits`, `bits` is out of range, the half width is not positive, or `x` is NaN.
 pub fn flipped_estimate(x: f64, bit: usize, bits: usize, half_width: f64) -> Result<f64, Error> {
-    let grid = CellGrid::uniform(half_width, bits)?;
+    let grid = uniform_cells(half_width, bits)?;
     if bit >= bits {
         return refuse("bit", bit, format!("a bit below {bits}"));
     }
-    Ok(flipped_centre(grid.locate(x)?, bit, grid.cells(), half_width))
+    Ok(flipped_centre(grid.encode(x)?, bit, grid.cells(), half_width))
 }
 
 /// `P(bit wrong | x)`: the probability that the bit differs from that of the cell that contains `x`.

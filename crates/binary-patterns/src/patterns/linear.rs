@@ -2,8 +2,9 @@
 
 use crate::Error;
 use crate::patterns::grid::bits_in_range;
-use crate::{CellGrid, Pattern, PatternSensor};
+use crate::{Pattern, PatternSensor};
 use fewbits_numerics::error::refuse;
+use fewbits_quantizers::Quantizer;
 
 /// Selects the digits that are XORed: the most significant of the `bits` binary digits selects pattern 1.
 ///
@@ -103,23 +104,24 @@ pub fn mask_of(pattern: &Pattern) -> Option<Mask> {
 }
 
 /// Sensors of equal noise with the patterns of these masks.
-pub fn sensors_of(masks: &[Mask], grid: &CellGrid, noise_deviation: f64) -> Result<Vec<PatternSensor>, Error> {
+pub fn sensors_of(masks: &[Mask], grid: &Quantizer, noise_deviation: f64) -> Result<Vec<PatternSensor>, Error> {
     let bits = grid_bits(grid)?;
     let sensor = |mask: &Mask| PatternSensor::with_deviation(linear_pattern(*mask, bits)?.on(grid)?, noise_deviation);
     masks.iter().map(sensor).collect()
 }
 
 /// Number of bits of the grid's cell index; an error if its number of cells is not a power of two.
-pub fn grid_bits(grid: &CellGrid) -> Result<usize, Error> {
-    match grid.bits() {
-        Some(bits) => bits_in_range(bits),
-        None => refuse("grid", format!("{} cells", grid.cells()), "a power of two of cells"),
+pub fn grid_bits(grid: &Quantizer) -> Result<usize, Error> {
+    match grid.cells() {
+        cells if cells.is_power_of_two() => bits_in_range(cells.trailing_zeros() as usize),
+        cells => refuse("grid", format!("{cells} cells"), "a power of two of cells"),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::uniform_cells;
 
     fn strings(masks: &[Mask], bits: usize) -> Vec<String> {
         masks
@@ -143,7 +145,7 @@ mod tests {
         // Table 5.2 prints this one, which is no XOR of natural patterns.
         assert_eq!(mask_of(&"10001110".parse().unwrap()), None);
         assert_eq!(mask_of(&"010".parse().unwrap()), None);
-        let grid = CellGrid::uniform(0.3, 4).unwrap();
+        let grid = uniform_cells(0.3, 4).unwrap();
         for mask in 1..16 {
             let pattern = linear_pattern(mask, 4).unwrap();
             assert_eq!(mask_of(&pattern), Some(mask));

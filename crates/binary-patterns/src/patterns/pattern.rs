@@ -1,9 +1,10 @@
 //! Bit patterns over the cells of a grid.
 
+use crate::BinaryQuantizer;
 use crate::Error;
-use crate::{BinaryQuantizer, CellGrid};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::refuse;
+use fewbits_quantizers::Quantizer;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
@@ -54,7 +55,7 @@ impl Pattern {
     ///
     /// # Errors
     /// If the number of bits is not the number of cells of the grid.
-    pub fn on(&self, grid: &CellGrid) -> Result<BinaryQuantizer, Error> {
+    pub fn on(&self, grid: &Quantizer) -> Result<BinaryQuantizer, Error> {
         if self.cells() != grid.cells() {
             return refuse("grid", format!("of {} cells", grid.cells()), format!("{}, one a bit", self.cells()));
         }
@@ -84,7 +85,7 @@ impl Pattern {
     }
 
     /// The pattern over `grid` of this quantizer; `None` unless all its breakpoints are edges of the grid (to `1e-9` of its extent).
-    pub(crate) fn of(quantizer: &BinaryQuantizer, grid: &CellGrid) -> Option<Self> {
+    pub(crate) fn of(quantizer: &BinaryQuantizer, grid: &Quantizer) -> Option<Self> {
         let edges = grid.breakpoints();
         let slack = 1e-9 * edges.iter().fold(0.0, |m, e| f64::max(m, e.abs()));
         let places = quantizer
@@ -138,6 +139,7 @@ impl FromStr for Pattern {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::uniform_cells;
 
     fn pattern(text: &str) -> Pattern {
         text.parse().unwrap()
@@ -153,7 +155,7 @@ mod tests {
 
     #[test]
     fn runs_merge_into_thresholds() {
-        let grid = CellGrid::uniform(1.0, 2).unwrap();
+        let grid = uniform_cells(1.0, 2).unwrap();
         assert_eq!(pattern("0110").on(&grid).unwrap().breakpoints(), [-0.5, 0.5]);
         let long = pattern("01100110").on(&grid);
         assert!(matches!(long, Err(Error::Argument(e)) if e.value == "of 4 cells" && e.expected == "8, one a bit"));

@@ -1,7 +1,6 @@
 //! One-bit quantizers: breakpoints at which the bit changes.
 
-use crate::{CellGrid, Error};
-use fewbits_numerics::ArgumentError;
+use crate::Error;
 use fewbits_numerics::normal::{interval, log_interval, pdf};
 use fewbits_quantizer_design::outcomes::{Table, cell_probabilities};
 use fewbits_quantizers::Quantizer;
@@ -16,10 +15,21 @@ const VANISHED: f64 = 39.0;
 ///
 /// [`Pattern`]: crate::Pattern
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct BinaryQuantizer {
-    /// The cells between the breakpoints; the bit is 0 in every second one.
-    cells: CellGrid,
+#[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
+pub struct BinaryQuantizer(Quantizer);
+
+impl TryFrom<Vec<f64>> for BinaryQuantizer {
+    type Error = Error;
+
+    fn try_from(breakpoints: Vec<f64>) -> Result<Self, Error> {
+        Self::new(breakpoints)
+    }
+}
+
+impl From<BinaryQuantizer> for Vec<f64> {
+    fn from(binary: BinaryQuantizer) -> Self {
+        binary.breakpoints().to_vec()
+    }
 }
 
 impl BinaryQuantizer {
@@ -28,13 +38,13 @@ impl BinaryQuantizer {
     /// # Errors
     /// If there is no breakpoint, one is not finite, or they do not increase strictly.
     pub fn new(breakpoints: Vec<f64>) -> Result<Self, Error> {
-        let cells = CellGrid::from_breakpoints(breakpoints)?;
-        Ok(Self { cells })
+        let labels = (0..=breakpoints.len()).map(|cell| cell % 2).collect();
+        Ok(Self(Quantizer::with_labels(breakpoints, labels)?))
     }
 
     /// The breakpoints, increasing.
     pub fn breakpoints(&self) -> &[f64] {
-        self.cells.breakpoints()
+        self.0.breakpoints()
     }
 
     /// The bit of a measurement: the parity of the number of breakpoints at or below it.
@@ -44,7 +54,7 @@ impl BinaryQuantizer {
     /// # Errors
     /// If the measurement is NaN.
     pub fn encode(&self, measurement: f64) -> Result<bool, Error> {
-        Ok(fewbits_node::pattern_bit(self.breakpoints(), measurement).map_err(ArgumentError::from)?)
+        Ok(self.0.encode(measurement)? == 1)
     }
 
     /// `[P(0|x), P(1|x)]` for the measurement `Y = x + N(0, noise_deviation^2)`.
@@ -114,13 +124,10 @@ impl BinaryQuantizer {
     }
 }
 
-impl TryFrom<&BinaryQuantizer> for Quantizer {
-    type Error = Error;
-
-    /// The same cells, with the bit as level.
-    fn try_from(binary: &BinaryQuantizer) -> Result<Self, Error> {
-        let labels = (0..=binary.breakpoints().len()).map(|cell| cell % 2).collect();
-        Self::with_labels(binary.breakpoints().to_vec(), labels)
+/// The same cells, with the bit as level.
+impl From<BinaryQuantizer> for Quantizer {
+    fn from(binary: BinaryQuantizer) -> Self {
+        binary.0
     }
 }
 

@@ -3,11 +3,12 @@
 use super::outcomes::{Candidates, Outcomes};
 use crate::Error;
 use crate::observation::bank::MAX_OUTCOMES;
-use crate::{Bank, BinaryQuantizer, CellGrid, Pattern, PatternSensor, Source};
+use crate::{Bank, BinaryQuantizer, Pattern, PatternSensor, Source};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{at_least_one, positive, refuse};
 use fewbits_quantizer_design::outcomes::Table;
+use fewbits_quantizers::Quantizer;
 use nalgebra::DMatrix;
 use rand::RngExt;
 
@@ -40,7 +41,7 @@ pub struct Descent {
 impl Descended {
     /// The pattern of each sensor over `grid`; `None` if its breakpoints are not the grid's. [`mask_of`](crate::mask_of) gives a linear
     /// one's mask.
-    pub fn patterns(&self, grid: &CellGrid) -> Vec<Option<Pattern>> {
+    pub fn patterns(&self, grid: &Quantizer) -> Vec<Option<Pattern>> {
         self.sensors.iter().map(|s| Pattern::of(s.quantizer(), grid)).collect()
     }
 }
@@ -251,11 +252,12 @@ impl<'a> Kernel<'a> {
 mod tests {
     use super::super::LinearSearch;
     use super::*;
+    use crate::uniform_cells;
     use crate::{linear_pattern, mask_of, rank};
     use approx::assert_relative_eq;
 
-    fn masks(grid: &CellGrid) -> Vec<BinaryQuantizer> {
-        let bits = grid.bits().unwrap();
+    fn masks(grid: &Quantizer) -> Vec<BinaryQuantizer> {
+        let bits = grid.cells().trailing_zeros() as usize;
         (1..1 << bits)
             .map(|m| linear_pattern(m, bits).unwrap().on(grid).unwrap())
             .collect()
@@ -264,7 +266,7 @@ mod tests {
     #[test]
     fn it_finds_the_exhaustive_optimum() {
         let source = Source::uniform(1.0).unwrap();
-        let grid = CellGrid::uniform(1.0, 3).unwrap();
+        let grid = uniform_cells(1.0, 3).unwrap();
         for snr in [5.0, 18.2] {
             let noise = source.noise_deviation(snr).unwrap();
             let exact = LinearSearch::with_deviation(source, grid.clone(), noise, 6)
@@ -288,7 +290,7 @@ mod tests {
     #[test]
     fn unequal_sensors_and_asymmetric_patterns_are_evaluated_exactly() {
         let source = Source::uniform(1.0).unwrap();
-        let grid = CellGrid::uniform(1.0, 2).unwrap();
+        let grid = uniform_cells(1.0, 2).unwrap();
         let all: Vec<_> = Pattern::all(4).unwrap().iter().map(|p| p.on(&grid).unwrap()).collect();
         let descent = Descent::with_deviations(source, vec![0.1, 0.4, 0.4], all.clone()).unwrap();
         let kernel = Kernel::new(&descent);
@@ -313,7 +315,7 @@ mod tests {
     #[test]
     fn bad_input_is_refused() {
         let source = Source::uniform(1.0).unwrap();
-        let candidates = masks(&CellGrid::uniform(1.0, 2).unwrap());
+        let candidates = masks(&uniform_cells(1.0, 2).unwrap());
         assert!(Descent::with_deviations(source, vec![], candidates.clone()).is_err());
         assert!(Descent::with_deviations(source, vec![0.1], vec![]).is_err());
         assert!(Descent::with_deviations(source, vec![-0.1], candidates.clone()).is_err());

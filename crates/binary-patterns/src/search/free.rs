@@ -83,7 +83,7 @@ pub fn free_breakpoints(
 fn settled(model: &ObservationModel, mut thresholds: Vec<Vec<f64>>) -> Result<Vec<BinaryQuantizer>, Error> {
     loop {
         let quantizers = thresholds.into_iter().map(BinaryQuantizer::new);
-        let quantizers: Vec<Quantizer> = quantizers.map(|q| Quantizer::try_from(&q?)).collect::<Result<_, _>>()?;
+        let quantizers: Vec<Quantizer> = quantizers.map(|q| Ok(q?.into())).collect::<Result<_, Error>>()?;
         let system = System::ideal(model.clone(), quantizers)?;
         let found = design::improved(&system, Criterion::MeanSquaredError, &Newton::default())?;
         thresholds = found.quantizers().iter().map(|q| q.breakpoints().to_vec()).collect();
@@ -106,8 +106,8 @@ fn settled(model: &ObservationModel, mut thresholds: Vec<Vec<f64>>) -> Result<Ve
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::CellGrid;
     use crate::patterns::linear::sensors_of;
+    use crate::uniform_cells;
     use approx::assert_relative_eq;
 
     fn sensors() -> Vec<PatternSensor> {
@@ -122,7 +122,7 @@ mod tests {
     fn free_breakpoints_know_no_unit() {
         let run = |v: f64| {
             let source = Source::uniform(v).unwrap();
-            let grid = CellGrid::uniform(v, 3).unwrap();
+            let grid = uniform_cells(v, 3).unwrap();
             let noise = source.noise_deviation(5.0).unwrap();
             let start = sensors_of(&[4, 4, 6], &grid, noise).unwrap();
             let found = free_breakpoints(&source, &start, 0.05, 2).unwrap();

@@ -3,7 +3,8 @@
 use fewbits_baselines::binary_patterns::{Decoder, network_rate_distortion, printed_crlb};
 use fewbits_binary_patterns::bounds::{centralised_bound, optimal_weight_van_trees};
 use fewbits_binary_patterns::search::free_breakpoints;
-use fewbits_binary_patterns::{Bank, BinaryQuantizer, CellGrid, PatternSensor, Source};
+use fewbits_binary_patterns::{Bank, BinaryQuantizer, PatternSensor, Source, uniform_cells};
+use fewbits_quantizers::Quantizer;
 use proptest::prelude::*;
 
 fn source() -> impl Strategy<Value = Source> {
@@ -24,9 +25,9 @@ fn quantizer(thresholds: &[f64], source: &Source) -> BinaryQuantizer {
     BinaryQuantizer::new(thresholds.iter().map(|t| t * scale).collect()).unwrap()
 }
 
-fn grid(source: &Source) -> CellGrid {
+fn grid(source: &Source) -> Quantizer {
     let scale = source.variance().sqrt();
-    CellGrid::from_breakpoints(
+    Quantizer::new(
         [-1.2, -0.6, -0.25, 0.0, 0.25, 0.6, 1.2]
             .iter()
             .map(|t| t * scale)
@@ -104,7 +105,7 @@ proptest! {
 fn the_printed_bound_is_valid_for_gaussian_sources_only() {
     let gaussian = Source::gaussian_with_deviation(0.6).unwrap();
     let uniform = Source::uniform(1.0).unwrap();
-    let grid = CellGrid::uniform(1.0, 3).unwrap();
+    let grid = uniform_cells(1.0, 3).unwrap();
     let patterns = ["00001111", "00111100", "01100110"].map(|p| p.parse::<fewbits_binary_patterns::Pattern>().unwrap());
     let quantizers: Vec<_> = patterns.iter().map(|p| p.on(&grid).unwrap()).collect();
     for snr in [-10.0, 0.0, 10.0, 20.0] {
@@ -167,7 +168,7 @@ fn tables_have_limits() {
 #[test]
 fn vanishing_likelihoods_do_not_become_nan() {
     let source = Source::uniform(1.0).unwrap();
-    let grid = CellGrid::uniform(1.0, 3).unwrap();
+    let grid = uniform_cells(1.0, 3).unwrap();
     for snr in [29.0, 45.0, 60.0] {
         let noise = source.noise_deviation(snr).unwrap();
         let quantizers: Vec<_> = ["00001111", "00111100", "00111100", "01100110"]
@@ -206,7 +207,7 @@ fn vanishing_likelihoods_do_not_become_nan() {
 fn free_breakpoints_beat_the_grid() {
     let source = Source::uniform(1.0).unwrap();
     let noise = source.noise_deviation(10.0).unwrap();
-    let grid = CellGrid::uniform(1.0, 3).unwrap();
+    let grid = uniform_cells(1.0, 3).unwrap();
     let start: Vec<PatternSensor> = ["00001111", "00111100", "00111100"]
         .iter()
         .map(|p| {
@@ -230,7 +231,7 @@ fn free_breakpoints_beat_the_grid() {
 #[test]
 fn the_posterior_mean_is_biased_at_the_ends() {
     let source = Source::uniform(1.0).unwrap();
-    let grid = CellGrid::uniform(1.0, 3).unwrap();
+    let grid = uniform_cells(1.0, 3).unwrap();
     let bank = gray(source, &grid, 18.2);
     let table = bank.table().unwrap();
     let (bias, _) = table.conditional_error(1.0).unwrap();
@@ -250,7 +251,7 @@ fn the_posterior_mean_is_biased_at_the_ends() {
 #[test]
 fn vanishing_noise_is_resolved() {
     let source = Source::uniform(1.0).unwrap();
-    let grid = CellGrid::uniform(1.0, 3).unwrap();
+    let grid = uniform_cells(1.0, 3).unwrap();
     let floor = 0.25 * 0.25 / 12.0;
     for snr in [80.0, 140.0] {
         let bank = gray(source, &grid, snr);
@@ -264,7 +265,7 @@ fn vanishing_noise_is_resolved() {
 }
 
 /// Three Gray patterns on a grid.
-fn gray(source: Source, grid: &CellGrid, snr: f64) -> Bank {
+fn gray(source: Source, grid: &Quantizer, snr: f64) -> Bank {
     let on = |p: &str| p.parse::<fewbits_binary_patterns::Pattern>().unwrap().on(grid).unwrap();
     let quantizers = ["00001111", "00111100", "01100110"].map(on).to_vec();
     Bank::homogeneous_with_deviation(source, quantizers, source.noise_deviation(snr).unwrap()).unwrap()

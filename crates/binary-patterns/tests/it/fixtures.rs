@@ -8,8 +8,9 @@ use fewbits_baselines::binary_patterns::{
 use fewbits_binary_patterns::bounds::{centralised_bound, optimal_weight_van_trees};
 use fewbits_binary_patterns::search::{LinearSearch, MaskSet, free_breakpoints};
 use fewbits_binary_patterns::{
-    Bank, CellGrid, Mask, Pattern, PatternSensor, Source, gray_basis, linear_pattern, natural_basis,
+    Bank, Mask, Pattern, PatternSensor, Source, gray_basis, linear_pattern, natural_basis, uniform_cells,
 };
+use fewbits_quantizers::Quantizer;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -25,17 +26,17 @@ fn gauss() -> Source {
     Source::gaussian_with_deviation(0.1f64.sqrt()).unwrap()
 }
 
-fn gauss_grid() -> CellGrid {
+fn gauss_grid() -> Quantizer {
     printed_gaussian_cells(0.1f64.sqrt()).unwrap()
 }
 
-fn grid(bits: usize) -> CellGrid {
-    CellGrid::uniform(1.0, bits).unwrap()
+fn grid(bits: usize) -> Quantizer {
+    uniform_cells(1.0, bits).unwrap()
 }
 
-fn bank(source: Source, grid: &CellGrid, masks: &[Mask], snr: f64) -> Bank {
+fn bank(source: Source, grid: &Quantizer, masks: &[Mask], snr: f64) -> Bank {
     let noise = source.noise_deviation(snr).unwrap();
-    let bits = grid.bits().unwrap();
+    let bits = grid.cells().trailing_zeros() as usize;
     let quantizers = masks
         .iter()
         .map(|&m| linear_pattern(m, bits).unwrap().on(grid).unwrap())
@@ -43,7 +44,7 @@ fn bank(source: Source, grid: &CellGrid, masks: &[Mask], snr: f64) -> Bank {
     Bank::homogeneous_with_deviation(source, quantizers, noise).unwrap()
 }
 
-fn mmse(source: Source, grid: &CellGrid, masks: &[Mask], snr: f64) -> f64 {
+fn mmse(source: Source, grid: &Quantizer, masks: &[Mask], snr: f64) -> f64 {
     bank(source, grid, masks, snr).mmse().unwrap()
 }
 

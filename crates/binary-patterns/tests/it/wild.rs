@@ -2,8 +2,9 @@
 
 use fewbits_baselines::binary_patterns::{bounded_mle, printed_gaussian_cells, remote_distortion};
 use fewbits_binary_patterns::bounds::centralised_bound;
-use fewbits_binary_patterns::{Bank, BinaryQuantizer, CellGrid, PatternSensor, Source};
+use fewbits_binary_patterns::{Bank, BinaryQuantizer, PatternSensor, Source, uniform_cells};
 use fewbits_core::{Link, Observation, Scheme, factor::Factor, laws::wild};
+use fewbits_quantizers::Quantizer;
 use proptest::prelude::*;
 
 fn wild() -> impl Strategy<Value = f64> {
@@ -25,9 +26,9 @@ proptest! {
                 prop_assert!(!number.is_nan() && number >= 0.0, "{:?} {}: {}", source, x[1], number);
             }
         }
-        for grid in [CellGrid::uniform(x[0], bits), CellGrid::from_breakpoints(x[..count].to_vec()), CellGrid::lloyd_max(x[0], bits), printed_gaussian_cells(x[0])].into_iter().flatten() {
+        for grid in [uniform_cells(x[0], bits), Quantizer::new(x[..count].to_vec()), printed_gaussian_cells(x[0])].into_iter().flatten() {
             prop_assert!(grid.breakpoints().iter().all(|b| b.is_finite()), "{:?}", grid);
-            let _ = grid.locate(x[1]);
+            let _ = grid.encode(x[1]);
         }
         let mut sorted = x[..count].to_vec();
         sorted.sort_by(f64::total_cmp);

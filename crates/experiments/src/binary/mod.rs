@@ -14,7 +14,8 @@ pub(crate) mod table5_2;
 use crate::prelude::*;
 use fewbits_baselines::binary_patterns::printed_gaussian_cells;
 use fewbits_binary_patterns::search::{Descent, LinearSearch};
-use fewbits_binary_patterns::{Bank, CellGrid, Mask, Pattern, Source, linear_pattern, rank};
+use fewbits_binary_patterns::{Bank, Mask, Pattern, Source, linear_pattern, rank, uniform_cells};
+use fewbits_quantizers::Quantizer;
 
 /// Axis of the curves.
 const ERROR: &str = "mean squared error / V²";
@@ -26,7 +27,7 @@ const GAUSSIAN_VARIANCE: f64 = 0.1;
 #[derive(Clone)]
 struct Scene {
     source: Source,
-    grid: CellGrid,
+    grid: Quantizer,
     noise: f64,
 }
 
@@ -34,7 +35,7 @@ impl Scene {
     /// Uniform on `[-1, 1]` over `2^bits` cells.
     fn uniform(bits: usize, snr_db: f64) -> Result<Self, Error> {
         let source = Source::uniform(1.0)?;
-        let grid = CellGrid::uniform(1.0, bits)?;
+        let grid = uniform_cells(1.0, bits)?;
         Self::new(source, grid, snr_db)
     }
 
@@ -46,7 +47,7 @@ impl Scene {
         Self::new(source, grid, snr_db)
     }
 
-    fn new(source: Source, grid: CellGrid, snr_db: f64) -> Result<Self, Error> {
+    fn new(source: Source, grid: Quantizer, snr_db: f64) -> Result<Self, Error> {
         let noise = source.noise_deviation(snr_db)?;
         Ok(Self { source, grid, noise })
     }

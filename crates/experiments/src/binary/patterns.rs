@@ -2,7 +2,8 @@
 
 use super::{Scene, pattern, pattern_panel};
 use crate::prelude::*;
-use fewbits_binary_patterns::{BinaryQuantizer, CellGrid, Mask, Pattern, gray_basis, natural_basis};
+use fewbits_binary_patterns::{BinaryQuantizer, Mask, Pattern, gray_basis, natural_basis, uniform_cells};
+use fewbits_quantizers::Quantizer;
 
 pub struct Clipping;
 
@@ -44,11 +45,11 @@ impl Figure for Clipping {
          the two sides of this rule swapped (dashed); taken literally that ruins the best eight patterns."; linear("cell"));
 
     fn run(&self, p: &ClippingParameters, _: &Context<'_>) -> Result<Clipped, Error> {
-        let grid = CellGrid::uniform(1.0, p.bits)?;
+        let grid = uniform_cells(1.0, p.bits)?;
         let count = grid.cells();
         let place = |i: i32| {
             let y = f64::from(i) / 100.0;
-            let cell = grid.locate(y)?;
+            let cell = grid.encode(y)?;
             let swapped = match y {
                 y if y < -1.0 => count - 1,
                 y if y > 1.0 => 0,
@@ -65,7 +66,7 @@ impl Figure for Clipping {
         let all = scene.search(p.masks.len())?.ranking()?;
         let own = scene.mmse(&p.masks)?;
         // The swapped rule is a pattern over a grid with two more cells, which carry the opposite end's bit.
-        let grid = CellGrid::from_breakpoints([&[-1.0], grid.breakpoints(), &[1.0]].concat())?;
+        let grid = Quantizer::new([&[-1.0], grid.breakpoints(), &[1.0]].concat())?;
         let wide = Scene { grid, ..scene };
         let swapped = |masks: &[Mask]| -> Result<f64, Error> {
             let turned = |&mask: &Mask| {

@@ -56,7 +56,8 @@ mod tests {
     }
 
     pub(super) fn noise_of(variances: &[f64]) -> Noise {
-        Noise::independent_with_variances(variances).unwrap()
+        let deviations: Vec<f64> = variances.iter().map(|v| v.sqrt()).collect();
+        Noise::independent_with_deviations(&deviations).unwrap()
     }
 
     #[test]

@@ -42,18 +42,6 @@ impl Noise {
         Self::one_factor_with_deviations(&vec![0.0; deviations.len()], deviations)
     }
 
-    /// Independent noise with the given variances.
-    ///
-    /// # Errors
-    /// If there is no sensor or a variance is not a positive number.
-    pub fn independent_with_variances(variances: &[f64]) -> Result<Self, Error> {
-        let deviations = variances
-            .iter()
-            .map(|v| fewbits_numerics::error::positive("noise variance", *v).map(f64::sqrt))
-            .collect::<Result<Vec<_>, _>>()?;
-        Self::independent_with_deviations(&deviations)
-    }
-
     /// Noise of the given standard deviations and the same correlation between any two sensors. A negative correlation is possible for two
     /// only.
     ///

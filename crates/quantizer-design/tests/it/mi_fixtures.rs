@@ -163,7 +163,7 @@ fn lloyd_max_of_the_normal(entry: &Entry) {
 fn remote(entry: &Entry) {
     let i = |k| number(&entry.inputs[k]);
     let prior = Prior::normal(0.0, i("sx2").sqrt()).unwrap();
-    let noise = Noise::independent_with_variances(&[i("s2")]).unwrap();
+    let noise = Noise::independent_with_deviations(&[i("s2").sqrt()]).unwrap();
     close(
         entry,
         "D",
@@ -182,7 +182,8 @@ fn ceo(entry: &Entry) {
         None => (numbers(s2), numbers(rate)),
     };
     let prior = Prior::normal(0.0, number(&entry.inputs["sx2"]).sqrt()).unwrap();
-    let noise = Noise::independent_with_variances(&s2).unwrap();
+    let deviations: Vec<f64> = s2.iter().map(|s2| s2.sqrt()).collect();
+    let noise = Noise::independent_with_deviations(&deviations).unwrap();
     close(entry, "D", bounds::ceo(&prior, &noise, &rate).unwrap().distortion, number(&entry.value));
 }
 

@@ -30,7 +30,6 @@ fn priors(x: &[f64; 8]) -> impl Iterator<Item = Prior> {
 fn noises(x: &[f64; 8]) -> impl Iterator<Item = Noise> {
     [
         Noise::independent_with_deviations(&x[4..6]),
-        Noise::independent_with_variances(&x[4..6]),
         Noise::equicorrelated_with_deviations(&x[4..6], x[6]),
         Noise::one_factor_with_deviations(&x[2..4], &x[4..6]),
     ]

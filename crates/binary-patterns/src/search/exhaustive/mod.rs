@@ -75,13 +75,14 @@ impl LinearSearch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{CellGrid, Source};
+    use crate::{Source, uniform_cells};
     use approx::assert_relative_eq;
+    use fewbits_quantizers::Quantizer;
 
     fn search(bits: usize, sensors: usize, snr: f64) -> LinearSearch {
         let source = Source::uniform(1.0).unwrap();
         let noise = source.noise_deviation(snr).unwrap();
-        LinearSearch::with_deviation(source, CellGrid::uniform(1.0, bits).unwrap(), noise, sensors).unwrap()
+        LinearSearch::with_deviation(source, uniform_cells(1.0, bits).unwrap(), noise, sensors).unwrap()
     }
 
     #[test]
@@ -103,7 +104,7 @@ mod tests {
     #[test]
     fn an_asymmetric_grid_gives_the_same_as_direct_evaluation() {
         let source = Source::gaussian_with_deviation(0.4).unwrap();
-        let grid = CellGrid::from_breakpoints(vec![-0.5, 0.1, 0.3]).unwrap();
+        let grid = Quantizer::new(vec![-0.5, 0.1, 0.3]).unwrap();
         let search = LinearSearch::with_deviation(source, grid, 0.2, 3).unwrap();
         for set in search.ranking().unwrap() {
             assert_relative_eq!(set.mse, search.bank(&set.masks).unwrap().mmse().unwrap(), max_relative = 1e-8);
@@ -121,7 +122,7 @@ mod tests {
         ] {
             assert!(refused.unwrap_err().to_string().contains("sensors"));
         }
-        let grid = CellGrid::from_breakpoints(vec![0.0, 1.0]).unwrap();
+        let grid = Quantizer::new(vec![0.0, 1.0]).unwrap();
         assert!(LinearSearch::with_deviation(Source::uniform(1.0).unwrap(), grid, 0.1, 3).is_err());
         assert!(matches!(search(10, 12, 10.0).best(), Err(Error::TooLarge { .. })));
         assert!(matches!(search(6, 40, 10.0).best(), Err(Error::TooLarge { .. } | Error::Argument(_))));

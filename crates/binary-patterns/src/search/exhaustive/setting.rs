@@ -1,9 +1,10 @@
 //! The search space of an exhaustive search.
 
 use crate::patterns::linear::{grid_bits, sensors_of};
-use crate::{Bank, CellGrid, Error, Mask, PatternSensor, Source};
+use crate::{Bank, Error, Mask, PatternSensor, Source};
 use fewbits_numerics::binomial;
 use fewbits_numerics::error::{at_least_one, positive};
+use fewbits_quantizers::Quantizer;
 
 /// A set of masks, one per sensor, in increasing order, with its error.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,7 +32,7 @@ pub struct MaskSet {
 #[derive(Debug, Clone)]
 pub struct LinearSearch {
     pub(super) source: Source,
-    pub(super) grid: CellGrid,
+    pub(super) grid: Quantizer,
     pub(super) bits: usize,
     pub(super) noise_deviation: f64,
     pub(super) sensors: usize,
@@ -43,7 +44,12 @@ impl LinearSearch {
     ///
     /// # Errors
     /// If the grid does not have `2^B` cells, the noise is not positive and finite, or there is no sensor.
-    pub fn with_deviation(source: Source, grid: CellGrid, noise_deviation: f64, sensors: usize) -> Result<Self, Error> {
+    pub fn with_deviation(
+        source: Source,
+        grid: Quantizer,
+        noise_deviation: f64,
+        sensors: usize,
+    ) -> Result<Self, Error> {
         let bits = grid_bits(&grid)?;
         at_least_one("sensors", sensors)?;
         Ok(Self {
