@@ -53,105 +53,36 @@ pub use measured::Measured;
 pub use picture::plotted;
 pub use schema::{Column, Table, Value};
 
-/// Every figure and table, in the order of the publications.
-pub fn all() -> Vec<&'static dyn AnyFigure> {
-    vec![
-        &dymbo::fig3::KalmanVariance,
-        &dymbo::fig4::Loss,
-        &dymbo::fig5::Convergence,
-        &dymbo::prop1b::PosteriorShape,
-        &dymbo::prop2::FirstMessage,
-        &dymbo::threshold::ThresholdPlace,
-        &dymbo::gap::GapToExact,
-        &dymbo::bits::WordLength,
-        &dymbo::selftuning::SelfTuning,
-        &mi::iterations::FIGURE42,
-        &mi::iterations::FIGURE43,
-        &mi::table4_1::Table41,
-        &mi::table4_2::Table42,
-        &mi::table4_3::Table43,
-        &mi::table4_4::Table44,
-        &mi::table4_5::Table45,
-        &mi::table4_5::Mismatch,
-        &mi::iterations::FIGURE44,
-        &mi::iterations::FIGURE45,
-        &binary::patterns::Clipping,
-        &binary::patterns::NATURAL,
-        &binary::patterns::GRAY,
-        &binary::patterns::EXTRA,
-        &binary::patterns::Response,
-        &binary::crlb::PrintedBounds,
-        &binary::table5_1::Table,
-        &binary::optimum::Optimum,
-        &binary::decoders::Decoders,
-        &binary::gaussian::GaussianSource,
-        &binary::table5_2::Table,
-        &binary::feedback::Feedback,
-        &assign::shapes::Landings,
-        &assign::table6_1::Table,
-        &assign::networks::SPREAD,
-        &assign::networks::MEAN,
-        &assign::shapes::BitErrors,
-        &cfwmd::scalar::FIG1,
-        &cfwmd::scalar::FIG2,
-        &cfwmd::no_feedback::FIG3,
-        &cfwmd::vector::FIG4,
-        &cfwmd::vector::FIG5,
-        &cfwmd::vector::FIG6,
-        &cfwmd::field::Fig7,
-        &cfwmd::field::FIG8,
-        &cfwmd::field::FIG9,
-        &cfwmd::field::FIG10,
-        &cfwmd::scalar::TABLE1,
-        &cfwmd::vector::TABLE2,
-        &cfwmd::field::TABLE3,
-        &cfwmd::beyond::LOSSY,
-        &cfwmd::beyond::SCHEDULED,
-        &cfwmd::no_feedback::NO_FEEDBACK,
-        &diffusive::route::Trace,
-        &diffusive::route::Route,
-        &diffusive::chains::FIG3,
-        &diffusive::chains::FIG4,
-        &diffusive::beliefs::FIG5,
-        &diffusive::beliefs::FIG6,
-        &diffusive::chains::FIG7,
-        &diffusive::chains::FIG8,
-        &diffusive::chains::FIG9,
-        &diffusive::chains::FIG10,
-        &diffusive::table1::Table1,
-        &diffusive::bytes::Bytes,
-        &diffusive::envelope::Envelope,
-        &diffusive::unknowns::Unknowns,
-        &diffusive::rooms::Rooms,
-        &diffusive::ranks::Ranks,
-        &handoff::fig2::Fig2,
-        &handoff::fig3::Fig3,
-        &handoff::fig4::Fig4,
-        &handoff::fig5::Fig5,
-        &handoff::fig6::FIG6A,
-        &handoff::fig6::FIG6B,
-        &handoff::fig6c::Fig6c,
-        &handoff::reduction::Reductions,
-        &handoff::rate::Rate,
-        &network::frontier::Frontier,
-        &network::faults::Faulty,
-        &real::bits::Bits,
-        &real::packets::Packets,
-        &real::loss::Loss,
-        &real::codecs::Codecs,
-        &mpa::fig3_3::Fig33,
-        &mpa::sweeps::Mse,
-        &mpa::sweeps::Fig34,
-        &mpa::sweeps::Fig35,
-        &mpa::sweeps::Low,
-        &mpa::association::Fig37,
-        &mpa::association::Table,
-        &mpa::ablation::Ablation,
-        &mpa::bound::Bounds,
-        &mpa::encoder::Encoders,
-        &mpa::leader::Leaders,
-        &problems::filters::Filters,
-        &problems::bussgang::Bussgang,
-        &targets::gospa::Targets,
-    ]
+macro_rules! figures {
+    ($($system:ident: $($module:ident::$figure:ident),+;)+) => {
+        /// Every figure and table, in the order of the publications.
+        pub fn all() -> Vec<&'static dyn AnyFigure> {
+            vec![$($(&$system::$module::$figure),+),+]
+        }
+    };
+}
+
+figures! {
+    dymbo: fig3::KalmanVariance, fig4::Loss, fig5::Convergence, prop1b::PosteriorShape, prop2::FirstMessage,
+        threshold::ThresholdPlace, gap::GapToExact, bits::WordLength, selftuning::SelfTuning;
+    mi: iterations::FIGURE42, iterations::FIGURE43, table4_1::Table41, table4_2::Table42, table4_3::Table43,
+        table4_4::Table44, table4_5::Table45, table4_5::Mismatch, iterations::FIGURE44, iterations::FIGURE45;
+    binary: patterns::Clipping, patterns::NATURAL, patterns::GRAY, patterns::EXTRA, patterns::Response,
+        crlb::PrintedBounds, table5_1::Table, optimum::Optimum, decoders::Decoders, gaussian::GaussianSource,
+        table5_2::Table, feedback::Feedback;
+    assign: shapes::Landings, table6_1::Table, networks::SPREAD, networks::MEAN, shapes::BitErrors;
+    cfwmd: scalar::FIG1, scalar::FIG2, no_feedback::FIG3, vector::FIG4, vector::FIG5, vector::FIG6, field::Fig7,
+        field::FIG8, field::FIG9, field::FIG10, scalar::TABLE1, vector::TABLE2, field::TABLE3, beyond::LOSSY,
+        beyond::SCHEDULED, no_feedback::NO_FEEDBACK;
+    diffusive: route::Trace, route::Route, chains::FIG3, chains::FIG4, beliefs::FIG5, beliefs::FIG6, chains::FIG7,
+        chains::FIG8, chains::FIG9, chains::FIG10, table1::Table1, bytes::Bytes, envelope::Envelope,
+        unknowns::Unknowns, rooms::Rooms, ranks::Ranks;
+    handoff: fig2::Fig2, fig3::Fig3, fig4::Fig4, fig5::Fig5, fig6::FIG6A, fig6::FIG6B, fig6c::Fig6c,
+        reduction::Reductions, rate::Rate;
+    network: frontier::Frontier, faults::Faulty;
+    real: bits::Bits, packets::Packets, loss::Loss, codecs::Codecs;
+    mpa: fig3_3::Fig33, sweeps::Mse, sweeps::Fig34, sweeps::Fig35, sweeps::Low, association::Fig37,
+        association::Table, ablation::Ablation, bound::Bounds, encoder::Encoders, leader::Leaders;
+    problems: filters::Filters, bussgang::Bussgang;
+    targets: gospa::Targets;
 }

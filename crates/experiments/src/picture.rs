@@ -193,12 +193,9 @@ impl<'a> Picture<'a> {
     /// The column `i` of rows as layers; none where it has no value.
     fn layer(&self, label: String, i: usize, rows: &[&[Value]]) -> Vec<Layer> {
         let columns = &self.table.columns;
-        let error = columns
-            .get(i + 1)
-            .filter(|next| next.name == format!("{}_se", columns[i].name));
         let mark = |row: &&[Value]| {
-            let error = error.and_then(|_| number(&row[i + 1])).unwrap_or(0.0);
-            Some(((self.place(row)?, number(&row[i])?), error))
+            let cell = self.table.measured(row, i)?;
+            Some(((self.place(row)?, cell.value), cell.error()))
         };
         let (points, errors): (Vec<_>, Vec<_>) = rows.iter().filter_map(mark).unzip();
         let layers = match columns[i].role {
@@ -215,7 +212,7 @@ impl<'a> Picture<'a> {
 
     fn place(&self, row: &[Value]) -> Option<f64> {
         if self.places.is_empty() {
-            return number(self.cells(Role::x, row).next()?.1);
+            return self.cells(Role::x, row).next()?.1.number();
         }
         let own = self.value(Role::x, row);
         let place = self.places.iter().position(|place| *place == own);
@@ -230,14 +227,6 @@ fn name(column: &Column) -> String {
         ("", "") => meaning.to_owned(),
         ("", unit) => format!("{meaning} / {unit}"),
         (label, _) => label.to_owned(),
-    }
-}
-
-fn number(value: &Value) -> Option<f64> {
-    match value {
-        Value::Number(number) => Some(*number),
-        Value::Integer(count) => Some(*count as f64),
-        Value::Text(_) | Value::Missing => None,
     }
 }
 

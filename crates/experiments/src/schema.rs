@@ -104,6 +104,17 @@ pub enum Value {
     Missing,
 }
 
+impl Value {
+    /// The number that it is.
+    pub(crate) fn number(&self) -> Option<f64> {
+        match self {
+            Self::Number(number) => Some(*number),
+            Self::Integer(count) => Some(*count as f64),
+            Self::Text(_) | Self::Missing => None,
+        }
+    }
+}
+
 /// Numbers are written with the shortest digits that read back to the same bits.
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -160,6 +171,14 @@ impl Table {
             (table.rows, table.keys) = (rows, keys);
         }
         Ok(tables)
+    }
+
+    /// The number of a row in column `i`, with its standard error where the next column holds it.
+    pub(crate) fn measured(&self, row: &[Value], i: usize) -> Option<Measured> {
+        let error = format!("{}_se", self.columns[i].name);
+        let next = self.columns.get(i + 1).filter(|next| next.name == error);
+        let error = next.and_then(|_| row.get(i + 1)?.number());
+        Some(Measured::new(row.get(i)?.number()?, error))
     }
 
     /// Name of the CSV file in the figure of this id.

@@ -3,7 +3,7 @@
 use super::{Claims, Expected};
 use crate::measured::Measured;
 use crate::reference;
-use crate::schema::{Table, Value};
+use crate::schema::Table;
 
 impl Claims {
     /// One claim for each reference `<figure>/<quantity>/<key>`: the row of that key has that value, within the reference's
@@ -107,19 +107,10 @@ impl Claims {
     }
 }
 
-/// The key and the value of each row in a column, with its standard error where the next column holds it.
+/// The key and the value of each row in a column.
 fn cells(table: &Table, i: usize) -> impl Iterator<Item = (String, Option<Measured>)> {
-    let number = |value: Option<&Value>| match value {
-        Some(Value::Number(number)) => Some(*number),
-        Some(Value::Integer(count)) => Some(*count as f64),
-        _ => None,
-    };
-    let error = format!("{}_se", table.columns[i].name);
-    let has_error = table.columns.get(i + 1).is_some_and(|next| next.name == error);
-    table.keys.iter().zip(&table.rows).map(move |(key, row)| {
-        let error = if has_error { number(row.get(i + 1)) } else { None };
-        (key.clone().unwrap_or_default(), number(row.get(i)).map(|value| Measured::new(value, error)))
-    })
+    let rows = table.keys.iter().zip(&table.rows);
+    rows.map(move |(key, row)| (key.clone().unwrap_or_default(), table.measured(row, i)))
 }
 
 /// A row that is found by a name: what follows the quantity in the keys of its references. `rows!` writes it.

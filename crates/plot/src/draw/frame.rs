@@ -27,7 +27,7 @@ pub(super) struct Frame<'a, 'b> {
     pub(super) bottom: f64,
 }
 
-fn round(place: Place) -> (i32, i32) {
+pub(super) fn round(place: Place) -> (i32, i32) {
     (place.0.round() as i32, place.1.round() as i32)
 }
 

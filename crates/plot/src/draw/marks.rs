@@ -1,6 +1,6 @@
 //! Layers on their axes.
 
-use super::frame::{Drawn, Frame, MARK, mark};
+use super::frame::{Drawn, Frame, MARK, mark, round};
 use super::style::{PAPER, TICK, colour, dashes, heat, marker, pen, text, wide};
 use crate::{Layer, Shape};
 use plotters::element::{PathElement, Polygon, Rectangle, Text};
@@ -26,23 +26,21 @@ pub(super) fn draw(frame: &Frame<'_, '_>, layer: &Layer, shades: (f64, f64)) -> 
             ..
         } => {
             let shown = || {
-                points
-                    .iter()
-                    .filter_map(|p| Some((p, frame.place(*p).filter(|at| frame.inside(*at))?)))
+                points.iter().enumerate().filter_map(|(i, p)| {
+                    let at = frame.place(*p).filter(|at| frame.inside(*at))?;
+                    let error = errors.get(i).copied().filter(|e| e.is_finite()).unwrap_or(0.0);
+                    Some((p, at, error))
+                })
             };
-            let round = |x: f64, y: f64| (x.round() as i32, y.round() as i32);
-            for ((p, at), error) in shown()
-                .zip(errors_of(points, errors, frame))
-                .filter(|(_, error)| *error > 0.0)
-            {
+            for (p, at, error) in shown().filter(|(.., error)| *error > 0.0) {
                 let end = |sign: f64| match sideways {
-                    true => round(frame.across_cut(p.0 + sign * error), at.1),
-                    false => round(at.0, frame.down_cut(p.1 + sign * error)),
+                    true => round((frame.across_cut(p.0 + sign * error), at.1)),
+                    false => round((at.0, frame.down_cut(p.1 + sign * error))),
                 };
                 let bar = PathElement::new(vec![end(-1.0), end(1.0)], ink.stroke_width(6));
                 frame.area.draw(&bar)?;
             }
-            for (_, at) in shown() {
+            for (_, at, _) in shown() {
                 mark(frame.area, at, marker(layer), ink)?;
             }
             Ok(())
@@ -64,7 +62,7 @@ pub(super) fn draw(frame: &Frame<'_, '_>, layer: &Layer, shades: (f64, f64)) -> 
                 .chain(upper.rev())
                 .filter(|p| frame.x.accepts(p.0));
             let outline: Vec<_> = outline
-                .map(|p| (frame.across(p.0).round() as i32, frame.down_cut(p.1).round() as i32))
+                .map(|p| round((frame.across(p.0), frame.down_cut(p.1))))
                 .collect();
             frame.area.draw(&Polygon::new(outline, ink.mix(0.25)))
         }
@@ -75,28 +73,20 @@ pub(super) fn draw(frame: &Frame<'_, '_>, layer: &Layer, shades: (f64, f64)) -> 
                     continue;
                 };
                 let (half, high) = (0.5 * wide(words, TICK) + 6.0, 0.42 * f64::from(TICK));
-                let round = |x: f64, y: f64| (x.round() as i32, y.round() as i32);
                 let mut at = at;
                 if *beside {
                     let (last, first) = (frame.right - half, frame.top + high);
                     at = ((at.0 + MARK + half).min(last), (at.1 - MARK - high).max(first));
-                    let ground = [round(at.0 - half, at.1 - high), round(at.0 + half, at.1 + high)];
+                    let ground = [round((at.0 - half, at.1 - high)), round((at.0 + half, at.1 + high))];
                     let paper = Rectangle::new(ground, PAPER.mix(0.55).filled());
                     frame.area.draw(&paper)?;
                 }
-                let name = Text::new(words.clone(), round(at.0, at.1), style.clone());
+                let name = Text::new(words.clone(), round(at), style.clone());
                 frame.area.draw(&name)?;
             }
             Ok(())
         }
     }
-}
-
-/// The error bars of those points that are shown; 0 where there is none.
-fn errors_of(points: &[(f64, f64)], errors: &[f64], frame: &Frame<'_, '_>) -> Vec<f64> {
-    let shown = |p: &(f64, f64)| frame.place(*p).is_some_and(|at| frame.inside(at));
-    let error = |(i, _): (usize, &(f64, f64))| errors.get(i).copied().filter(|e| e.is_finite()).unwrap_or(0.0);
-    points.iter().enumerate().filter(|(_, p)| shown(p)).map(error).collect()
 }
 
 /// Writes the names of contours on them, along steep ones upwards: as near to the middle of what is seen as no other contour and
@@ -139,8 +129,7 @@ pub(super) fn names(frame: &Frame<'_, '_>, layers: &[Layer]) -> Drawn {
         let places = shares.map(|share: f64| (share * (curve.len() - 1) as f64) as usize);
         let at = places.into_iter().find(free).unwrap_or(places[0]);
         let here = ground(at);
-        let round = |x: f64, y: f64| (x.round() as i32, y.round() as i32);
-        let paper = Rectangle::new([round(here.0, here.2), round(here.1, here.3)], PAPER.mix(0.9).filled());
+        let paper = Rectangle::new([round((here.0, here.2)), round((here.1, here.3))], PAPER.mix(0.9).filled());
         frame.area.draw(&paper)?;
         let style = text(TICK).pos(Pos::new(HPos::Center, VPos::Center));
         let style = if steep(at) {
@@ -148,7 +137,7 @@ pub(super) fn names(frame: &Frame<'_, '_>, layers: &[Layer]) -> Drawn {
         } else {
             style
         };
-        let name = Text::new(layer.label.clone(), round(curve[at].0, curve[at].1), style);
+        let name = Text::new(layer.label.clone(), round(curve[at]), style);
         frame.area.draw(&name)?;
         written.push(here);
     }

@@ -8,14 +8,14 @@ mod scale;
 mod style;
 
 use crate::{Error, Panel, Plot, Shape};
-use frame::{Drawn, Frame};
+use frame::{Drawn, Frame, Place, path};
 use names::{GAP, Names};
 use plotters::backend::SVGBackend;
 use plotters::chart::ChartBuilder;
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::drawing::{DrawingArea, DrawingAreaErrorKind, IntoDrawingArea};
-use plotters::element::{PathElement, Text};
+use plotters::element::Text;
 use plotters::style::ShapeStyle;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use scale::Scaled;
@@ -184,10 +184,7 @@ fn tick(axis: &Scaled, value: f64) -> String {
 fn small_ticks(frame: &Frame<'_, '_>) -> Drawn {
     const LENGTH: f64 = 16.0;
     let pen = ShapeStyle::from(&INK).stroke_width(3);
-    let draw = |from: (f64, f64), to: (f64, f64)| {
-        let round = |(x, y): (f64, f64)| (x.round() as i32, y.round() as i32);
-        frame.area.draw(&PathElement::new(vec![round(from), round(to)], pen))
-    };
+    let draw = |from: Place, to: Place| path(frame.area, &[from, to], &[], pen);
     for value in frame.x.small_ticks() {
         let across = frame.across(value);
         draw((across, frame.bottom), (across, frame.bottom - LENGTH))?;
