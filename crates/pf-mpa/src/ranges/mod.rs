@@ -375,7 +375,7 @@ impl RangeTracker {
         }
         let taken = drop_improbable(next, known.negligible);
         if self.pushed.is_multiple_of(COMPARED) {
-            merge_same(next);
+            merge_same(next, known.axes);
             add_mirrored(known, next);
         }
         Ok((taken, residual))
