@@ -19,8 +19,8 @@ const CONTRADICTED: usize = 5;
 /// Or if the misfit of levels is this many deviations: about once in a hundred thousand ranges.
 const MISFIT: f64 = 4.3;
 /// The edge between the two levels of a single bit lies beside the expected range by as many of its deviations as the `ln` of the noise is
-/// uncertain, at most so many: a bit about the expected range says nothing about the noise.
-const ASIDE: f64 = 0.8;
+/// uncertain, at most so many: a bit about the expected range says nothing about the noise, nor whether a doubtful anchor is good.
+pub(super) const ASIDE: f64 = 0.8;
 
 /// Probabilities of hypotheses.
 pub(super) fn shares_of(hypotheses: &[Hypothesis]) -> Vec<f64> {
