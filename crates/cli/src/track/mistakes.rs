@@ -4,6 +4,9 @@ use crate::numbers::short;
 use fewbits_pf_mpa::{Mistake, RangeSettings, mistake_of, proportion_of};
 use nalgebra::Vector3;
 
+/// What is said of a height that is wrong.
+pub(super) const AT_ANOTHER_HEIGHT: &str = "the target were at the height";
+
 /// Ranges from which a mistake is found.
 pub(super) const FIRST_RANGES: usize = 400;
 
@@ -57,6 +60,10 @@ pub(super) fn mistake(
 ) -> Option<String> {
     let found = mistake_of(anchors, settings, &named(anchors, first)).ok()??;
     let what = match found {
+        Mistake::Height(height) => {
+            let height = short(height);
+            format!("{AT_ANOTHER_HEIGHT} {height}: --height {height} says so")
+        }
         Mistake::Swapped(one, other) => {
             format!("anchors {one} and {other} had each other's place: exchange their names in the table of anchors")
         }
@@ -65,7 +72,8 @@ pub(super) fn mistake(
         }
         Mistake::Squared => "they were squares of distances: give the roots".to_owned(),
         Mistake::Flight => {
-            "they were times of flight in nanoseconds and places in metres: multiply them by 0.299792458".to_owned()
+            "they were times of flight in nanoseconds, or feet, and places in metres: multiply them by 0.299792458, or 0.3048"
+                .to_owned()
         }
         Mistake::RoundTrip => {
             "they were times there and back in nanoseconds and places in metres: multiply them by 0.149896229"

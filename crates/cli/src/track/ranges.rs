@@ -3,7 +3,7 @@
 use super::anchors::Anchor;
 use super::divisor::common_divisor;
 use super::instant::Instant;
-use super::mistakes::{FIRST_RANGES, limited, mistake, proportion};
+use super::mistakes::{AT_ANOTHER_HEIGHT, FIRST_RANGES, limited, mistake, proportion};
 use super::odometry::Odometry;
 use super::path;
 use super::range_settings::{Strengths, settings};
@@ -27,6 +27,8 @@ const LONG: f64 = 8.0;
 const SHORT: f64 = 0.05;
 /// A track that is lost once in so many rows is lost often.
 const OFTEN: u64 = 20;
+/// Probability below which an anchor whose ranges travel as levels is told to contradict the others.
+const SURELY: f64 = 0.1;
 
 #[derive(Serialize)]
 struct Summary {
@@ -247,7 +249,9 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
     if !is_regular(&options.table.file) {
         summary.hints.extend(proportion(anchors, settings, &first));
     }
-    let is_wrong = |one: &AnchorSummary| one.works < 0.5 || one.own_bias.is_some() || one.lasting.is_some();
+    // A level says little: chance alone contradicts for a while.
+    let least = if travel == Travel::Full { 0.5 } else { SURELY };
+    let is_wrong = |one: &AnchorSummary| one.works < least || one.own_bias.is_some() || one.lasting.is_some();
     let is_suspect =
         summary.losses > 0 || OFTEN * summary.doubtful > summary.rows || summary.anchors.iter().any(is_wrong);
     if is_suspect {
@@ -265,7 +269,7 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
             .hints
             .push(format!("{} copies of reports were dropped", instants.copies));
     }
-    let lines = lines(&summary, &tracker, settings);
+    let lines = lines(&summary, &tracker, settings, least);
     summarise(&summary, &lines, options.json)?;
     Ok(Ending::Good)
 }
@@ -278,13 +282,15 @@ fn farthest(anchors: &[Anchor]) -> f64 {
     pairs.fold(0.0, f64::max)
 }
 
-fn lines(summary: &Summary, tracker: &RangeTracker, settings: RangeSettings) -> Vec<String> {
+fn lines(summary: &Summary, tracker: &RangeTracker, settings: RangeSettings, least: f64) -> Vec<String> {
     let silence = settings.silence;
     let mut lines = vec![
         format!("{} rows, {} ranges of {:.2} bits on average", summary.rows, summary.ranges, summary.bits_per_range),
         format!("{} rows without a place, track lost {} times", summary.searching, summary.losses),
     ];
-    if summary.searching == summary.rows {
+    // Values that are no distances say nothing of anchors.
+    let has_ranges = summary.ranges > 0 || summary.negative == 0;
+    if summary.searching == summary.rows && has_ranges {
         lines.push(format!("a place needs ranges of {} anchors within {silence} s: a larger --silence, or, if times are no seconds, --time-format with their unit",
             tracker.needed()
         ));
@@ -295,7 +301,7 @@ fn lines(summary: &Summary, tracker: &RangeTracker, settings: RangeSettings) -> 
             summary.ambiguous
         ));
     }
-    if summary.negative > 0 && summary.ranges == 0 {
+    if !has_ranges {
         lines.push(format!(
             "all {} values are negative: they are no distances. Signal strengths in dBm need --rssi; differences of ranges need --unknown-clock",
             summary.negative
@@ -313,12 +319,17 @@ fn lines(summary: &Summary, tracker: &RangeTracker, settings: RangeSettings) -> 
         ));
     }
     lines.extend(summary.hints.iter().cloned());
+    // A wrong height lengthens the ranges of the nearest anchors, and their errors last.
+    let is_height = summary.hints.iter().any(|hint| hint.contains(AT_ANOTHER_HEIGHT));
     for anchor in &summary.anchors {
+        if anchor.ranges == 0 && !has_ranges {
+            continue;
+        }
         if anchor.ranges == 0 {
             lines.push(format!("no range from anchor {}", anchor.name));
-        } else if anchor.works < 0.5 {
+        } else if anchor.works < least {
             lines.push(format!("anchor {} contradicts the others and is not used", anchor.name));
-        } else if let Some(bias) = anchor.own_bias {
+        } else if let Some(bias) = anchor.own_bias.filter(|_| !is_height) {
             let off = if bias > 0.0 { "long" } else { "short" };
             let size = if settings.proportional {
                 format!("{} %", short(100.0 * bias.abs().exp_m1()))
@@ -336,7 +347,7 @@ fn lines(summary: &Summary, tracker: &RangeTracker, settings: RangeSettings) -> 
         .iter()
         .filter_map(|one| Some((one.name.as_str(), one.lasting?)))
         .collect();
-    if !lasting.is_empty() {
+    if !lasting.is_empty() && !is_height {
         let most = lasting.iter().fold(0.0_f64, |most, (_, product)| most.max(*product));
         let names: Vec<&str> = lasting.iter().map(|(name, _)| *name).collect();
         lines.push(format!(

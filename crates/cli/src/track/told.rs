@@ -77,10 +77,12 @@ pub(super) fn take_told(
         }
         if let Some(height) = found {
             settings.height = Height::Known(height);
-            let height = short(height);
+            let level = anchors.first().map_or(0.0, |(_, place)| place.z);
+            let is_flat = anchors.iter().all(|(_, place)| place.z == level);
+            let (off, height, level) = (short((height - level).abs()), short(height), short(level));
             said.push(if is_flat {
                 format!(
-                    "the ranges say that the target is {height} higher or lower than the anchors: taken, as --height {height} says; --height 0 leaves it out"
+                    "the ranges say that the target is {off} higher or lower than the anchors: taken, as --height {height} says; --height {level} leaves it out"
                 )
             } else {
                 format!("the ranges say that the target is at the height {height}: taken, as --height {height} says")

@@ -316,3 +316,24 @@ fn a_height_that_no_option_says_is_found_or_asked_for() {
     let message = refused(folder.path(), &["ranges", "walk.csv", "--anchors", "anchors.csv"], b"");
     assert!(message.contains("--height is needed"), "{message}");
 }
+
+/// Defect: under a height that is not the target's, an anchor was told to be too long or too short.
+#[test]
+fn a_wrong_height_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let places = RECTANGLE.map(|[x, y, _]| [x, y, 2.6]);
+    anchors(folder.path(), &places, 1.0, true);
+    let mut numbers = Numbers(8);
+    let input = table(4, 120, |row, i| {
+        let turn = 0.08 * row as f64;
+        let truth = [6.0 + 5.0 * turn.sin(), 3.5 + 3.0 * (0.7 * turn).cos(), 0.6];
+        distance(&places[i], &truth) + 0.03 * numbers.normal()
+    });
+    let said = |height: &str| {
+        let words = ["ranges", "-", "--anchors", "anchors.csv", "--height", height];
+        text(&fewbits(folder.path(), &words, input.as_bytes()).stderr).to_owned()
+    };
+    let wrong = said("2.6");
+    assert!(wrong.contains("--height") && !wrong.contains("ranges of anchor"), "{wrong}");
+    assert!(!said("0.6").contains("--height"));
+}

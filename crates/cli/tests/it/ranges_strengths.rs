@@ -116,3 +116,12 @@ fn errors_that_last_are_told() {
         assert_eq!(told.contains("last from range to range"), is_exchanged, "{told}");
     }
 }
+
+/// Defect: of strengths without their law, no place was blamed on times and on anchors that were not heard, too.
+#[test]
+fn strengths_without_their_law_name_the_option() {
+    let folder = tempfile::tempdir().unwrap();
+    anchors(folder.path(), &RECTANGLE, 1.0, false);
+    let said = said(folder.path(), &["ranges", "-", "--anchors", "anchors.csv"], strengths(40).as_bytes());
+    assert!(said.contains("--rssi") && !said.contains("no range from") && !said.contains("--silence"), "{said}");
+}

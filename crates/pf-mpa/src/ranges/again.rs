@@ -13,7 +13,7 @@ impl RangeTracker {
     /// Starts acquisition again after a silence. What all hypotheses together say of bias and scale is kept, with larger variances.
     pub(super) fn pause(&mut self) {
         let priors = [self.known.bias, self.known.scale].map(|deviation| deviation * deviation);
-        if let Some(found) = calibration_of(&self.hypotheses) {
+        if let Some(found) = calibration_of(&self.hypotheses, self.known.axes) {
             for ((known, (mean, variance)), prior) in self.calibration.iter_mut().zip(found).zip(priors) {
                 let variance = variance + SILENT_SHARE * prior;
                 *known = if variance.is_finite() && mean * mean < 9.0 * prior {

@@ -1,7 +1,7 @@
 //! A hypothesis about the target: a bank of filters that differ in speed and noise, and how likely each anchor measures rightly.
 
 use super::arrived::Arrived;
-use super::gaussian::{Normal, Predicted, merge_into, merged};
+use super::gaussian::{Normal, Predicted, merge_into};
 use super::rest::Rest;
 use super::settings::Known;
 use super::step::Step;
@@ -26,6 +26,8 @@ pub(super) struct Hypothesis {
     /// Speed by speed, for each the noises. Those of weight 0 are left out: what they hold means nothing.
     pub(super) filters: Vec<Normal>,
     pub(super) weights: Vec<f64>,
+    /// The filters whose weight is not zero, in order: few of many.
+    pub(super) alive: Vec<usize>,
     /// Per anchor, the probability that its ranges depend on the distance.
     pub(super) good: Vec<f64>,
     /// Whether it is a piece of a curve of places: short enough that the error of scale is estimated though the ranges alone do not determine it.
@@ -46,7 +48,7 @@ pub(super) struct Hypothesis {
     pub(super) rest: Rest,
     /// A filter of less weight is left out.
     negligible: f64,
-    /// The next range, by each filter.
+    /// The next range, by each filter that is not left out.
     predicted: Vec<Predicted>,
     /// A buffer.
     mixed: Vec<Mixed>,
@@ -71,11 +73,17 @@ impl Default for Mixed {
 }
 
 impl Clone for Hypothesis {
+    /// Filters that are left out are not copied.
     fn clone(&self) -> Self {
+        let mut filters: Vec<Normal> = self.filters.iter().map(|_| Normal::unknown()).collect();
+        for i in &self.alive {
+            filters[*i].clone_from(&self.filters[*i]);
+        }
         Self {
             log_weight: self.log_weight,
-            filters: self.filters.clone(),
+            filters,
             weights: self.weights.clone(),
+            alive: self.alive.clone(),
             good: self.good.clone(),
             variant: self.variant,
             apart: self.apart,
@@ -88,15 +96,16 @@ impl Clone for Hypothesis {
             ranges: self.ranges,
             rest: self.rest,
             negligible: self.negligible,
-            predicted: self.predicted.clone(),
+            predicted: Vec::new(),
             mixed: Vec::new(),
         }
     }
 
-    /// Copies into the buffers that are there; filters that are left out are not copied.
+    /// The same into the buffers that are there.
     fn clone_from(&mut self, from: &Self) {
         self.log_weight = from.log_weight;
         self.weights.clone_from(&from.weights);
+        self.alive.clone_from(&from.alive);
         self.good.clone_from(&from.good);
         (self.variant, self.apart) = (from.variant, from.apart);
         self.is_cut = from.is_cut;
@@ -105,15 +114,10 @@ impl Clone for Hypothesis {
         (self.recent, self.behind) = (from.recent, from.behind);
         self.scores.clone_from(&from.scores);
         (self.ranges, self.rest, self.negligible) = (from.ranges, from.rest, from.negligible);
-        self.filters.truncate(from.filters.len());
-        let kept = self.filters.len();
-        for ((own, other), weight) in self.filters.iter_mut().zip(&from.filters).zip(&from.weights) {
-            if *weight > 0.0 {
-                own.clone_from(other);
-            }
+        self.filters.resize_with(from.filters.len(), Normal::unknown);
+        for i in &self.alive {
+            self.filters[*i].clone_from(&from.filters[*i]);
         }
-        self.filters.extend_from_slice(&from.filters[kept..]);
-        self.predicted.resize_with(from.predicted.len(), Predicted::default);
     }
 }
 
@@ -125,11 +129,12 @@ impl Hypothesis {
         good: Vec<f64>,
         variant: usize,
     ) -> Self {
-        let (anchors, count) = (good.len(), filters.len());
-        Self {
+        let anchors = good.len();
+        let mut made = Self {
             log_weight,
             filters,
             weights,
+            alive: Vec::new(),
             good,
             variant,
             apart: None,
@@ -142,9 +147,17 @@ impl Hypothesis {
             ranges: 0,
             rest: Rest::default(),
             negligible: 0.0,
-            predicted: vec![Predicted::default(); count],
+            predicted: Vec::new(),
             mixed: Vec::new(),
-        }
+        };
+        made.count_alive();
+        made
+    }
+
+    fn count_alive(&mut self) {
+        self.alive.clear();
+        let positive = self.weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0);
+        self.alive.extend(positive.map(|(i, _)| i));
     }
 
     /// Moves all filters on, after speed and noise may have changed. `share`: its probability. The less
@@ -163,6 +176,7 @@ impl Hypothesis {
             for speed in 0..speeds {
                 self.mix(speed * noises..(speed + 1) * noises, changes(NOISE_CHANGES), self.negligible);
             }
+            self.count_alive();
         }
         self.carry(known, step, &[0.0; 3]);
     }
@@ -170,17 +184,11 @@ impl Hypothesis {
     /// Moves all filters on, and by a displacement.
     pub(super) fn carry(&mut self, known: &Known, step: &Step, by: &[f64; 3]) {
         let noises = known.noises.len();
-        for (i, filter) in self.filters.iter_mut().enumerate() {
-            if self.weights[i] > 0.0 {
-                let speed = known.speeds[i / noises];
-                filter.predict(step, speed * speed);
-                filter
-                    .mean
-                    .iter_mut()
-                    .take(known.axes)
-                    .zip(by)
-                    .for_each(|(x, by)| *x += by);
-            }
+        for i in &self.alive {
+            let (filter, speed) = (&mut self.filters[*i], known.speeds[i / noises]);
+            filter.predict(step, speed * speed);
+            let positions = filter.mean.iter_mut().take(known.axes);
+            positions.zip(by).for_each(|(x, by)| *x += by);
         }
     }
 
@@ -228,32 +236,24 @@ impl Hypothesis {
         let above = place[2] - known.level;
         let noises = known.noises.len();
         let (mut mean, mut square) = (0.0, 0.0);
-        for (i, (filter, out)) in self.filters.iter().zip(&mut self.predicted).enumerate() {
-            if self.weights[i] == 0.0 {
-                continue;
-            }
-            filter.range(known.measured, place, above, anchor, out);
-            let noise = known.noises[i % noises];
-            mean += self.weights[i] * out.mean;
-            square += self.weights[i] * (out.variance + noise * noise);
+        self.predicted
+            .resize_with(self.alive.len().max(self.predicted.len()), Predicted::default);
+        for (i, out) in self.alive.iter().zip(&mut self.predicted) {
+            let (weight, noise) = (self.weights[*i], known.noises[i % noises]);
+            self.filters[*i].range(known.measured, place, above, anchor, out);
+            mean += weight * out.mean;
+            square += weight * (out.variance + noise * noise);
         }
-        let between: f64 = self
-            .predicted
-            .iter()
-            .zip(&self.weights)
-            .filter(|(_, w)| **w > 0.0)
-            .map(|(p, w)| w * (p.mean - mean).powi(2))
-            .sum();
-        (mean, square + between)
+        let between = |(i, one): (&usize, &Predicted)| self.weights[*i] * (one.mean - mean).powi(2);
+        let filters = self.alive.iter().zip(&self.predicted);
+        (mean, square + filters.map(between).sum::<f64>())
     }
 
     /// Gives all filters an unknown bias: with it the next range is as expected.
     pub(super) fn forget_bias(&mut self, known: &Known, deviation: f64, place: &[f64; 3], anchor: usize, range: f64) {
         let mut out = Predicted::default();
-        for (filter, weight) in self.filters.iter_mut().zip(&self.weights) {
-            if *weight == 0.0 {
-                continue;
-            }
+        for i in &self.alive {
+            let filter = &mut self.filters[*i];
             filter.range(known.measured, place, place[2] - known.level, anchor, &mut out);
             let bias = filter.mean[filter.bias()] + range - out.mean;
             filter.forget_bias(bias, deviation * deviation);
@@ -278,22 +278,17 @@ impl Hypothesis {
     ) -> Result<f64, Error> {
         let (noises, stray) = (known.noises.len(), arrived.stray(known.stray));
         if matches!(arrived, Arrived::First(_)) {
-            for i in (0..self.filters.len()).filter(|i| self.weights[*i] > 0.0) {
-                let predicted = &self.predicted[i];
+            for (i, predicted) in self.alive.iter().zip(&self.predicted) {
                 let (_, mean, variance, _) = arrived.right(predicted, known.noises[i % noises])?;
-                self.filters[i].condition(predicted, mean, variance, holds_scale);
+                self.filters[*i].condition(predicted, mean, variance, holds_scale);
             }
             return Ok(0.0);
         }
         let (good, outliers) = (self.good[anchor], known.outliers);
         let right_share = good * (1.0 - outliers);
         let (mut total, mut agreeing, mut score) = (0.0, 0.0, 0.0);
-        let old: f64 = self.weights.iter().sum();
-        for i in 0..self.filters.len() {
-            if self.weights[i] == 0.0 {
-                continue;
-            }
-            let predicted = &self.predicted[i];
+        let old: f64 = self.alive.iter().map(|i| self.weights[*i]).sum();
+        for (i, predicted) in self.alive.iter().copied().zip(&self.predicted) {
             let (density, mean, variance, innovation) = arrived.right(predicted, known.noises[i % noises])?;
             let right = right_share * density;
             let evidence = right + (1.0 - right_share) * stray;
@@ -312,16 +307,13 @@ impl Hypothesis {
         if total <= 0.0 {
             return Err(Error::Impossible);
         }
-        let largest = self
-            .weights
-            .iter()
-            .fold(0.0_f64, |largest, weight| largest.max(*weight));
+        let weights = &mut self.weights;
+        let largest = self.alive.iter().fold(0.0_f64, |largest, i| largest.max(weights[*i]));
         let least = self.negligible.min(largest / total);
-        self.weights.iter_mut().for_each(|weight| {
-            *weight /= total;
-            if *weight < least {
-                *weight = 0.0;
-            }
+        self.alive.retain(|i| {
+            let share = weights[*i] / total;
+            weights[*i] = if share < least { 0.0 } else { share };
+            weights[*i] > 0.0
         });
         // The anchor: with `density` the mean over the filters, `agreeing` is `good (1 - outliers) density`.
         let still_good = (agreeing + good * outliers * stray) / total;
@@ -378,14 +370,8 @@ impl Hypothesis {
         (mean, covariance)
     }
 
-    /// The filters' common moments.
-    pub(super) fn moments(&self) -> Option<Normal> {
-        merged(self.parts())
-    }
-
     fn parts(&self) -> impl Iterator<Item = (f64, &Normal)> + Clone {
-        let all = self.weights.iter().copied().zip(&self.filters);
-        all.filter(|(weight, _)| *weight > 0.0)
+        self.alive.iter().map(|i| (self.weights[*i], &self.filters[*i]))
     }
 
     pub(super) fn is_finite(&self) -> bool {

@@ -22,6 +22,8 @@ const BAND: f64 = 1.959_963_984_540_054;
 /// Steps to the end of a band at most, and by how much the probability beside it may be off.
 const STEPS: usize = 60;
 const CLOSE: f64 = 1e-6;
+/// So many deviations beyond its mean a law is as good as over.
+const FAR: f64 = 6.0;
 
 /// The estimate after one range. Lengths are in the unit of the anchors' coordinates.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,6 +74,25 @@ struct Part {
 const BIAS: usize = 3;
 const SCALE: usize = 4;
 
+impl Part {
+    /// A part with these moments at some of its places, and zeros at the others.
+    fn new<const N: usize>(share: f64, places: [usize; N], (means, rows): ([f64; N], [[f64; N]; N])) -> Self {
+        let (mut mean, mut covariance) = ([0.0; 5], [[0.0; 5]; 5]);
+        for ((at, of_mean), row) in places.into_iter().zip(means).zip(rows) {
+            mean[at] = of_mean;
+            places
+                .into_iter()
+                .zip(row)
+                .for_each(|(other, x)| covariance[at][other] = x);
+        }
+        Self {
+            share,
+            mean,
+            covariance,
+        }
+    }
+}
+
 /// The estimate of all hypotheses together; `None` without any.
 pub(super) fn of(known: &Known, hypotheses: &[Hypothesis], lost: bool) -> Option<RangeEstimate> {
     let (axes, noises) = (known.axes, known.noises.len());
@@ -80,11 +101,11 @@ pub(super) fn of(known: &Known, hypotheses: &[Hypothesis], lost: bool) -> Option
         .iter()
         .zip(hypotheses)
         .map(|(share, one)| {
-            let (mean, covariance) = one.marginal(&[0, 1, 2, 2 * axes, 2 * axes + 1]);
-            Part {
-                share: *share,
-                mean,
-                covariance,
+            let (bias, scale) = (2 * axes, 2 * axes + 1);
+            if axes == 3 {
+                Part::new(*share, [0, 1, 2, BIAS, SCALE], one.marginal(&[0, 1, 2, bias, scale]))
+            } else {
+                Part::new(*share, [0, 1, BIAS, SCALE], one.marginal(&[0, 1, bias, scale]))
             }
         })
         .collect();
@@ -111,7 +132,8 @@ pub(super) fn of(known: &Known, hypotheses: &[Hypothesis], lost: bool) -> Option
         .count();
     let (mut noise, mut speed) = (0.0, 0.0);
     for (share, one) in shares.iter().zip(hypotheses) {
-        for (i, weight) in one.weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+        for i in &one.alive {
+            let weight = one.weights[*i];
             noise += share * weight * known.log_noises[i % noises];
             speed += share * weight * known.log_speeds[i / noises];
         }
@@ -177,7 +199,7 @@ fn band(laws: &[(f64, f64, f64)]) -> (f64, f64) {
     (end(laws, -BAND, 0.025), end(laws, BAND, 0.975))
 }
 
-/// Where the probability below reaches `target`, by Newton's steps between ends that hold it. `off`: the place for one law, in deviations.
+/// Where the probability below reaches `target`, by Halley's steps between ends that hold it. `off`: the place for one law, in deviations.
 fn end(laws: &[(f64, f64, f64)], off: f64, target: f64) -> f64 {
     let ends = laws.iter().map(|(_, mean, deviation)| mean + off * deviation);
     let (mut low, mut high) =
@@ -191,16 +213,20 @@ fn end(laws: &[(f64, f64, f64)], off: f64, target: f64) -> f64 {
         |(share, centre, deviation): &(f64, f64, f64)| share * (deviation * deviation + (centre - mean).powi(2));
     let mut x = (mean + off * laws.iter().map(variance).sum::<f64>().sqrt()).clamp(low, high);
     for _ in 0..STEPS {
-        let (mut below, mut density) = (0.0, 0.0);
+        let (mut below, mut density, mut slope) = (0.0, 0.0, 0.0);
         for (share, mean, deviation) in laws {
             let z = (x - mean) / deviation;
+            if z.abs() > FAR {
+                below += if z > 0.0 { *share } else { 0.0 };
+                continue;
+            }
             // A law without a deviation, at its mean.
             below += share * if z.is_nan() { 0.5 } else { normal::cdf(z) };
-            density += if *deviation > 0.0 {
-                share * normal::pdf(z) / deviation
-            } else {
-                0.0
-            };
+            if *deviation > 0.0 {
+                let own = share * normal::pdf(z) / deviation;
+                density += own;
+                slope -= own * z / deviation;
+            }
         }
         let error = below - target;
         if error.abs() < CLOSE || low >= high {
@@ -211,7 +237,9 @@ fn end(laws: &[(f64, f64, f64)], off: f64, target: f64) -> f64 {
         } else {
             high = x
         }
-        let step = x - error / density;
+        let newton = error / density;
+        let bend = 1.0 - 0.5 * newton * slope / density;
+        let step = x - newton / bend.clamp(0.5, 2.0);
         x = if step > low && step < high {
             step
         } else {

@@ -32,14 +32,11 @@ impl Search<'_> {
         self.known.measured.of(self.distance(point, one))
     }
 
+    #[inline]
     pub(super) fn distance(&self, point: &[f64], one: &Collected) -> f64 {
-        let squares: f64 = (0..self.axes()).map(|i| (point[i] - one.place[i]).powi(2)).sum();
-        let above = if self.axes() == 2 {
-            one.place[2] - self.known.level
-        } else {
-            0.0
-        };
-        (squares + above * above).sqrt()
+        let height = if self.axes() == 2 { self.known.level } else { point[2] };
+        let [x, y, z] = [point[0] - one.place[0], point[1] - one.place[1], height - one.place[2]];
+        (x * x + y * y + z * z).sqrt()
     }
 }
 

@@ -88,10 +88,6 @@ impl Normal {
         2 * self.axes
     }
 
-    pub(super) fn scale(&self) -> usize {
-        2 * self.axes + 1
-    }
-
     /// The coordinate of an anchor's own bias.
     pub(super) fn own(&self, anchor: usize) -> Option<usize> {
         let at = |number: usize| Some(2 * self.axes + 2 + number).filter(|at| *at < self.mean.len());
@@ -304,13 +300,7 @@ impl Normal {
     }
 }
 
-/// The normal law with the moments of a mixture. Weights need not sum to one; `None` if they sum to zero.
-pub(super) fn merged<'a>(parts: impl Iterator<Item = (f64, &'a Normal)> + Clone) -> Option<Normal> {
-    let mut out = Normal::unknown();
-    merge_into(parts, &mut out).then_some(out)
-}
-
-/// The same in a buffer that is there. Returns whether there is such a law.
+/// The normal law with the moments of a mixture. Weights need not sum to one. Returns whether there is such a law: not if they sum to zero.
 pub(super) fn merge_into<'a>(parts: impl Iterator<Item = (f64, &'a Normal)> + Clone, out: &mut Normal) -> bool {
     let total: f64 = parts.clone().map(|(weight, _)| weight).sum();
     let Some((_, first)) = parts.clone().next().filter(|_| total > 0.0 && total.is_finite()) else {
@@ -371,7 +361,7 @@ mod tests {
             normal.range(Measured::Distance, &place, 0.0, 0, &mut predicted);
             let factor = if k % 4 == 3 { 3.0 } else { 0.3 };
             normal.condition(&predicted, predicted.mean, factor * predicted.variance, true);
-            let scale = normal.scale();
+            let scale = 5;
             for i in (0..n).filter(|i| *i != scale) {
                 let cross = normal.covariance[i * n + scale];
                 let both = normal.variance(i) * normal.variance(scale);

@@ -5,10 +5,10 @@ use crate::Error;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
-/// Differences of height that are tried where the anchors' table says no heights, in spreads of the anchors.
+/// Differences of height that are tried where the anchors have one height, in spreads of the anchors.
 const TRIED: [f64; 6] = [0.0, 0.1, 0.2, 0.3, 0.45, 0.7];
 /// A difference must explain the ranges better than none by so many nats.
-const BETTER: f64 = 10.0;
+pub(super) const BETTER: f64 = 10.0;
 /// Where the anchors have heights: number of heights that are tried, from below the lowest anchor to above the highest by this share of the spread.
 const HEIGHTS: usize = 9;
 const BEYOND: f64 = 0.5;
@@ -21,8 +21,8 @@ pub(super) const RANGES: usize = 400;
 const FEWEST: usize = 8;
 
 /// The constant height of the target, from its first ranges: each height that is tried is a tracker, and their evidences decide. `ranges`: time in
-/// seconds, anchor and range. If all anchors have the height 0, it is the difference to them, above or below, and only returned if the ranges say that
-/// there is one. `None` if the ranges do not tell it, if it is stated or the clock unknown, if there are fewer than four anchors or eight ranges of
+/// seconds, anchor and range. If all anchors have one height, above and below it are the same: anchors that hang high are above the target. It is only
+/// returned then if the ranges say that there is a difference. `None` if the ranges do not tell it, if it is stated or the clock unknown, if there are fewer than four anchors or eight ranges of
 /// each that differ from the one before, or if a tracker loses the track.
 ///
 /// # Errors
@@ -62,9 +62,11 @@ pub fn height_of(
     let middle = anchors.iter().map(|(_, place)| place).sum::<Vector3<f64>>() / count;
     let squares: f64 = anchors.iter().map(|(_, place)| (place - middle).norm_squared()).sum();
     let spread = (squares / count).sqrt();
-    let is_flat = anchors.iter().all(|(_, place)| place.z == 0.0);
+    let level = anchors[0].1.z;
+    let is_flat = anchors.iter().all(|(_, place)| place.z == level);
     let tried: Vec<f64> = if is_flat {
-        TRIED.map(|share| share * spread).to_vec()
+        let side = if level > 0.0 { -1.0 } else { 1.0 };
+        TRIED.map(|share| level + side * share * spread).to_vec()
     } else {
         let heights = || anchors.iter().map(|(_, place)| place.z);
         let low = heights().fold(f64::INFINITY, f64::min) - BEYOND * spread;

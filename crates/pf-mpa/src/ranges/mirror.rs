@@ -40,10 +40,8 @@ pub(super) fn add_mirrored(known: &Known, hypotheses: &mut Vec<Hypothesis>) {
         }
         let mut mirrored = one.clone();
         mirrored.log_weight += CROSSED.ln();
-        for (state, weight) in mirrored.filters.iter_mut().zip(&mirrored.weights) {
-            if *weight > 0.0 {
-                line.mirror(state);
-            }
+        for i in &mirrored.alive {
+            line.mirror(&mut mirrored.filters[*i]);
         }
         added.push(mirrored);
     }

@@ -1,7 +1,7 @@
 //! Mistakes of tables that explain ranges which contradict each other.
 
-use super::heights::RANGES;
-use super::{RangeSettings, RangeTracker, Travel};
+use super::heights::{self, RANGES, height_of};
+use super::{Height, RangeSettings, RangeTracker, Travel};
 use crate::Error;
 use nalgebra::Vector3;
 
@@ -26,6 +26,8 @@ pub enum Mistake {
     Flight,
     /// The same for times to an anchor and back.
     RoundTrip,
+    /// The target is at this height, and not at that of the settings.
+    Height(f64),
 }
 
 /// What one tracker says of some ranges.
@@ -76,10 +78,42 @@ pub fn mistake_of(
 ) -> Result<Option<Mistake>, Error> {
     let ranges = &ranges[..ranges.len().min(RANGES)];
     let as_it_is = trial(anchors, settings, ranges)?;
-    if as_it_is.fits {
-        return Ok(None);
-    }
     let mut tried: Vec<(f64, Mistake)> = Vec::new();
+    let unsaid = RangeSettings {
+        height: Height::Unsaid,
+        ..settings
+    };
+    if let Some(height) = height_of(anchors, unsaid, ranges)? {
+        let at = RangeSettings {
+            height: Height::Known(height),
+            ..settings
+        };
+        let found = trial(anchors, at, ranges)?;
+        let log_evidence = found.log_evidence.filter(|_| found.fits);
+        tried.extend(log_evidence.map(|found| (found, Mistake::Height(height))));
+    }
+    // Few ranges of a wrong height fit, but less well.
+    if !as_it_is.fits {
+        try_tables(anchors, settings, ranges, &mut tried)?;
+    }
+    tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let second = tried.get(1).map_or(f64::NEG_INFINITY, |one| one.0);
+    let second = second.max(as_it_is.log_evidence.unwrap_or(f64::NEG_INFINITY));
+    let best = tried.into_iter().next().filter(|(best, mistake)| {
+        // As much as tells a height that nobody says.
+        let is_height = matches!(mistake, Mistake::Height(_));
+        *best > second + if is_height { heights::BETTER } else { BETTER }
+    });
+    Ok(best.map(|(_, mistake)| mistake))
+}
+
+/// Tries what may be wrong with the tables: those of anchors, and the unit of ranges.
+fn try_tables(
+    anchors: &[(String, Vector3<f64>)],
+    settings: RangeSettings,
+    ranges: &[(f64, &str, f64)],
+    tried: &mut Vec<(f64, Mistake)>,
+) -> Result<(), Error> {
     let mut fit = |anchors: &[(String, Vector3<f64>)], ranges: &[(f64, &str, f64)], slopes: f64, mistake: Mistake| {
         let found = trial(anchors, settings, ranges)?;
         tried.extend(
@@ -117,9 +151,5 @@ pub fn mistake_of(
         change(Mistake::Flight, &|range| LIGHT * range, &|_| LIGHT)?;
         change(Mistake::RoundTrip, &|range| 0.5 * LIGHT * range, &|_| 0.5 * LIGHT)?;
     }
-    tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let second = tried.get(1).map_or(f64::NEG_INFINITY, |one| one.0);
-    let second = second.max(as_it_is.log_evidence.unwrap_or(f64::NEG_INFINITY));
-    let best = tried.into_iter().next().filter(|(best, _)| *best > second + BETTER);
-    Ok(best.map(|(_, mistake)| mistake))
+    Ok(())
 }

@@ -59,7 +59,7 @@ use late::with_late;
 use measured::Measured;
 use mirror::add_mirrored;
 use nalgebra::Vector3;
-use odds::{count_contradictions, drop_improbable, is_lost, merge_same, shares_of, uncertainty_of_noise, weigh};
+use odds::{ASIDE, count_contradictions, drop_improbable, is_lost, merge_same, shares_of, uncertainty_of_noise, weigh};
 use residuals::Residuals;
 use rows::{Collected, Latest};
 use settings::{Known, NEGLIGIBLE_OF_LEVELS};
@@ -321,7 +321,13 @@ impl RangeTracker {
                 let aside = if bits == 1 {
                     // Not the same side for an anchor each time.
                     let is_above = (self.pushed + self.pushed / self.places.len()).is_multiple_of(2);
-                    let size = uncertainty_of_noise(&known.log_noises, next, &shares) * variance.sqrt();
+                    let doubt: f64 = next
+                        .iter()
+                        .zip(&shares)
+                        .map(|(one, share)| share * (1.0 - one.good[anchor]))
+                        .sum();
+                    let size =
+                        uncertainty_of_noise(&known.log_noises, next, &shares).max(ASIDE * doubt) * variance.sqrt();
                     if is_above { size } else { -size }
                 } else {
                     0.0
@@ -375,7 +381,7 @@ impl RangeTracker {
         }
         let taken = drop_improbable(next, known.negligible);
         if self.pushed.is_multiple_of(COMPARED) {
-            merge_same(next);
+            merge_same(next, known.axes);
             add_mirrored(known, next);
         }
         Ok((taken, residual))

@@ -52,8 +52,11 @@ impl Hypothesis {
     /// not tell it from these, and a filter that linearises them again and again would believe that they do. `is_short`: the anchors without biases
     /// of their own are fewer than position, bias and error of scale have coordinates.
     pub(super) fn rests(&mut self, known: &Known, is_short: bool) -> bool {
-        let heaviest = (0..self.filters.len()).max_by(|i, j| self.weights[*i].total_cmp(&self.weights[*j]));
-        let Some(heaviest) = heaviest else {
+        let heaviest = self
+            .alive
+            .iter()
+            .max_by(|i, j| self.weights[**i].total_cmp(&self.weights[**j]));
+        let Some(heaviest) = heaviest.copied() else {
             return false;
         };
         let state = &self.filters[heaviest];

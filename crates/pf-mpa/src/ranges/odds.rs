@@ -1,9 +1,7 @@
 //! The hypotheses beside each other: their probabilities, and which of them are one.
 
-use super::acquisition::is_same;
 use super::bank::Hypothesis;
 use super::fit::Calibration;
-use super::gaussian::Normal;
 
 /// A hypothesis whose probability is less than this share of the best one's is dropped in any case.
 const LEAST: f64 = 1e-5;
@@ -21,8 +19,8 @@ const CONTRADICTED: usize = 5;
 /// Or if the misfit of levels is this many deviations: about once in a hundred thousand ranges.
 const MISFIT: f64 = 4.3;
 /// The edge between the two levels of a single bit lies beside the expected range by as many of its deviations as the `ln` of the noise is
-/// uncertain, at most so many: a bit about the expected range says nothing about the noise.
-const ASIDE: f64 = 0.8;
+/// uncertain, at most so many: a bit about the expected range says nothing about the noise, nor whether a doubtful anchor is good.
+pub(super) const ASIDE: f64 = 0.8;
 
 /// Probabilities of hypotheses.
 pub(super) fn shares_of(hypotheses: &[Hypothesis]) -> Vec<f64> {
@@ -36,11 +34,11 @@ pub(super) fn shares_of(hypotheses: &[Hypothesis]) -> Vec<f64> {
 }
 
 /// Mean and variance of bias and scale by all hypotheses. `None` without any.
-pub(super) fn calibration_of(hypotheses: &[Hypothesis]) -> Option<Calibration> {
-    let state = hypotheses.first()?.moments()?;
+pub(super) fn calibration_of(hypotheses: &[Hypothesis], axes: usize) -> Option<Calibration> {
+    hypotheses.first()?;
     let mut sums = [(0.0, 0.0); 2];
     for (share, one) in shares_of(hypotheses).into_iter().zip(hypotheses) {
-        let (mean, covariance) = one.marginal(&[state.bias(), state.scale()]);
+        let (mean, covariance) = one.marginal(&[2 * axes, 2 * axes + 1]);
         for (i, (sum, squares)) in sums.iter_mut().enumerate() {
             *sum += share * mean[i];
             *squares += share * (covariance[i][i] + mean[i] * mean[i]);
@@ -125,30 +123,41 @@ pub(super) fn drop_improbable(hypotheses: &mut Vec<Hypothesis>, negligible: f64)
 }
 
 /// Of hypotheses about the same place with the same model, keeps the most probable, with the probability of all.
-pub(super) fn merge_same(hypotheses: &mut Vec<Hypothesis>) {
+pub(super) fn merge_same(hypotheses: &mut Vec<Hypothesis>, axes: usize) {
     if hypotheses.len() < 2 {
         return;
     }
     hypotheses.sort_by(|a, b| b.log_share().total_cmp(&a.log_share()));
-    let mut kept: Vec<(Hypothesis, Option<Normal>)> = Vec::new();
-    for one in hypotheses.drain(..) {
-        let moments = one.moments();
-        let twin = kept.iter_mut().find(|(other, known)| match (&moments, known) {
-            (Some(a), Some(b)) => other.variant == one.variant && is_near(a, b),
-            _ => false,
-        });
-        match twin {
-            Some((other, _)) => other.log_weight += (one.log_share() - other.log_share()).exp().ln_1p(),
-            None => kept.push((one, moments)),
+    // Moments of position, bias and scale.
+    let laws: Vec<Law> = hypotheses
+        .iter()
+        .map(|one| one.marginal(&[0, 1, axes - 1, 2 * axes, 2 * axes + 1]))
+        .collect();
+    let mut number = 0;
+    let mut kept: Vec<usize> = Vec::new();
+    let mut gained = vec![0.0; hypotheses.len()];
+    for (i, one) in hypotheses.iter().enumerate() {
+        let is_twin = |other: &&usize| hypotheses[**other].variant == one.variant && is_near(&laws[**other], &laws[i]);
+        match kept.iter().find(is_twin) {
+            Some(twin) => {
+                let other = hypotheses[*twin].log_share() + gained[*twin];
+                gained[*twin] += (one.log_share() - other).exp().ln_1p();
+            }
+            None => kept.push(i),
         }
     }
-    hypotheses.extend(kept.into_iter().map(|(one, _)| one));
+    hypotheses.retain_mut(|one| {
+        one.log_weight += gained[number];
+        number += 1;
+        kept.contains(&(number - 1))
+    });
 }
 
-/// Whether two laws say nearly the same of position, bias and scale.
-fn is_near(a: &Normal, b: &Normal) -> bool {
-    let close = |i: usize| (a.mean[i] - b.mean[i]).powi(2) <= 0.1 * a.variance(i).min(b.variance(i));
-    is_same(a, b) && (0..a.axes).chain([a.bias(), a.scale()]).all(close)
+type Law = ([f64; 5], [[f64; 5]; 5]);
+
+/// Whether two laws say nearly the same.
+fn is_near(a: &Law, b: &Law) -> bool {
+    (0..5).all(|i| (a.0[i] - b.0[i]).powi(2) <= 0.1 * a.1[i][i].min(b.1[i][i]))
 }
 
 /// Counts the ranges in a row for which anchors send ranges, but contradict each other so much that those that are left are not `enough`.
@@ -184,8 +193,8 @@ pub(super) fn is_lost(hypotheses: &[Hypothesis], are_levels: bool) -> bool {
 pub(super) fn uncertainty_of_noise(log_noises: &[f64], hypotheses: &[Hypothesis], shares: &[f64]) -> f64 {
     let (mut mean, mut square) = (0.0, 0.0);
     for (one, share) in hypotheses.iter().zip(shares) {
-        for (i, weight) in one.weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-            let log = log_noises[i % log_noises.len()];
+        for i in &one.alive {
+            let (weight, log) = (one.weights[*i], log_noises[i % log_noises.len()]);
             mean += share * weight * log;
             square += share * weight * log * log;
         }

@@ -3,7 +3,7 @@
 use fewbits_core::Dynamics;
 use fewbits_models::ContinuousLinear;
 use fewbits_monte_carlo::Stream;
-use fewbits_pf_mpa::{Mistake, RangeSettings, RangeTracker, Travel, height_of, mistake_of};
+use fewbits_pf_mpa::{Height, Mistake, RangeSettings, RangeTracker, Travel, height_of, mistake_of};
 use nalgebra::{Vector3, Vector4};
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -541,6 +541,33 @@ fn mistakes_of_tables_are_found() {
     assert_eq!(found(&turned, &as_they_are, &mut noise), Some(Mistake::Axes("h1".to_owned())));
     assert_eq!(found(&anchors, &|_, range| range * range, &mut noise), Some(Mistake::Squared));
     assert_eq!(found(&anchors, &|_, range| range / 0.149_896_229, &mut noise), Some(Mistake::RoundTrip));
+}
+
+/// Defect: under a height that is not the target's, an anchor was told to be too long or too short.
+#[test]
+fn a_wrong_height_is_told_as_one() {
+    let anchors: Vec<(String, Vector3<f64>)> = hall()
+        .into_iter()
+        .map(|(name, place)| (name, place + 2.6 * Vector3::z()))
+        .collect();
+    let mut rng = Stream::new(29).named("height").rng();
+    let ranges: Vec<(f64, &str, f64)> = (0..400)
+        .map(|k| {
+            let (time, (name, place)) = (0.1 * k as f64, &anchors[k % 5]);
+            let truth = Vector3::new(6.0 + 5.0 * (0.4 * time).sin(), 5.0 + 4.0 * (0.3 * time).cos(), 0.6);
+            (time, name.as_str(), (truth - place).norm() + 0.03 * rng.sample::<f64, _>(StandardNormal))
+        })
+        .collect();
+    let found = |height: f64| {
+        let settings = RangeSettings {
+            height: Height::Known(height),
+            ..RangeSettings::default()
+        };
+        mistake_of(&anchors, settings, &ranges).unwrap()
+    };
+    let wrong = found(2.6);
+    assert!(matches!(wrong, Some(Mistake::Height(height)) if (height - 0.6).abs() < 0.3), "{wrong:?}");
+    assert_eq!(found(0.6), None);
 }
 
 /// Four minutes in the hall in which two anchors are late together, again and again. Returns rows, coordinates held, the longest time wrong, and the root
