@@ -89,6 +89,21 @@ fn another_unit_is_told() {
     );
 }
 
+/// Defect: one of several jumps of a level was taken for a change of the unit.
+#[test]
+fn a_level_that_jumps_often_changes_no_unit() {
+    let (mut numbers, mut level, mut table) = (Numbers(78), 20.0, "a\n".to_owned());
+    for row in 0..400 {
+        // 20 degrees Celsius are 68 Fahrenheit.
+        let jumped = [0.0, 48.0, 0.0, -30.0][row / 50 % 4];
+        level += 0.02 * numbers.normal();
+        let scatter = if jumped > 0.0 { 0.54 } else { 0.3 };
+        table += &format!("{:.4}\n", level + jumped + scatter * numbers.normal());
+    }
+    let (_, summary) = tracked(&table, &[]);
+    assert!(!has_hint(&summary, "change at its value"), "{summary}");
+}
+
 /// Defect: errors that last from row to row were counted as independent ones: bands of 95 % held .3 of the rows.
 #[test]
 fn noise_that_lasts_widens_the_band() {

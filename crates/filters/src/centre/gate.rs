@@ -194,7 +194,16 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         if 2 * astray <= all {
             return None;
         }
-        for wide in widened(predicted) {
+        // From a prediction with which each report agrees, wider ones change nothing but rounding, by which reports that contradict each other would
+        // agree.
+        let agrees = |(reading, verdict): (&Reading<'_, D>, &Verdict), wide: &Gaussian<D>| {
+            reading.content != Content::Report
+                || reading.likelihood.is_none()
+                || verdict.fate == Fate::Excluded
+                || self.members[reading.seat].test(reading, wide).tail() > FITS
+        };
+        let enough = widened(predicted).position(|wide| readings.iter().zip(verdicts).all(|one| agrees(one, &wide)));
+        for wide in widened(predicted).take(enough.map_or(WIDENINGS, |enough| enough + 1 + FURTHER)) {
             let again = self.gate(&Law::Moments(wide), &wide, readings);
             let agree = reports(|fate| fate == Fate::Used, &again);
             let fits = readings.iter().zip(&again).all(|(reading, verdict)| {
@@ -224,6 +233,8 @@ pub(super) fn widened<const D: usize>(predicted: &Gaussian<D>) -> impl Iterator<
 /// Factor of the covariance at each step of the search for a wide enough prediction, and number of steps.
 const WIDER: f64 = 16.0;
 const WIDENINGS: usize = 60;
+/// Further steps, behind which the prediction pulls no report.
+const FURTHER: usize = 3;
 /// A report agrees with the wide prediction if at least this share of reports is as unlikely.
 pub(super) const FITS: f64 = 0.05;
 /// So many instants in a row must contradict the prediction before a single sensor is believed against it.

@@ -137,3 +137,25 @@ fn a_stuck_sensor_is_named_in_every_unit_and_after_a_restart() {
         }
     }
 }
+
+/// Two wild values on both sides of the prediction contradict each other however wide it is: the level has not jumped to one of them.
+#[test]
+fn wild_values_that_contradict_each_other_are_no_jump() {
+    for seed in 0..200 {
+        let mut rng = Stream::new(seed).named("both wild").rng();
+        let mut centre = pair(0.01, &mut rng);
+        for k in 1..=30_u32 {
+            centre.advance(&mut rng, f64::from(k)).unwrap();
+            let (one, other) = (0.1 * noise(&mut rng), 0.1 * noise(&mut rng));
+            centre.receive(&mut rng, &[slot(0, one), slot(1, other)]).unwrap();
+        }
+        centre.advance(&mut rng, 31.0).unwrap();
+        let (below, above) = (-25.0 + noise(&mut rng), 25.0 + noise(&mut rng));
+        let events = centre
+            .receive(&mut rng, &[slot(0, below), slot(1, above)])
+            .unwrap()
+            .events;
+        assert!(!events.contains(&Event::Reopened), "{seed}: {below} {above} {events:?}");
+        assert!(centre.estimate().mean()[0].abs() < 1.0, "{seed}");
+    }
+}
