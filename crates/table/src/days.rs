@@ -179,3 +179,31 @@ impl Clock {
         self.placed(found.date?, second, fraction, &found.zone)
     }
 }
+
+impl Clock {
+    /// The time of a second of a week by the clock of GPS, which has no leap seconds.
+    pub(crate) fn of_week(&self, week: &str, of_week: &str, decimals: u8) -> Result<Time, Problem> {
+        let unit = if decimals == 0 {
+            Unit::Seconds
+        } else {
+            Unit::Milliseconds
+        };
+        let week = week.trim().parse::<i64>().map_err(|_| NO_TIME)?;
+        if (0..1024).contains(&week) {
+            return Err((
+                "has a week of GPS before August 1999, or one that is counted modulo 1024",
+                "add the weeks of the earlier rounds, 1024 or 2048, to the column, or convert it to dates",
+            ));
+        }
+        let since = number(of_week.trim(), unit)?;
+        let day = since.0.div_euclid(86_400 * SECOND);
+        if !(0..7).contains(&day) {
+            return Err(NO_TIME);
+        }
+        let days = jiff::Span::new().try_days(week.saturating_mul(7).saturating_add(day as i64));
+        let first = jiff::civil::Date::constant(1980, 1, 6);
+        let date = days.and_then(|days| first.checked_add(days)).map_err(|_| NO_TIME)?;
+        let rest = since.0.rem_euclid(86_400 * SECOND);
+        self.placed(date, (rest / SECOND) as i64, rest % SECOND, &civil::Zone::Nothing)
+    }
+}

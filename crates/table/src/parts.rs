@@ -1,9 +1,7 @@
 //! Dates in several columns: which columns give one, and what each of them means.
 
 use crate::column::Column;
-use crate::time::{SECOND, Unit};
-use crate::written::{NO_TIME, Problem, number};
-use jiff::civil::Date;
+use crate::time::SECOND;
 
 /// Meaning of a column of a part of a date.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,33 +86,6 @@ pub(crate) fn weeks(columns: &[Column]) -> Option<Vec<usize>> {
     (0..columns.len().saturating_sub(1))
         .find(is_pair)
         .map(|i| vec![i, i + 1])
-}
-
-/// The day, the second and its parts by the clock of GPS, which has no leap seconds.
-pub(crate) fn of_week(week: &str, of_week: &str, decimals: u8) -> Result<(Date, i64, i128), Problem> {
-    let unit = if decimals == 0 {
-        Unit::Seconds
-    } else {
-        Unit::Milliseconds
-    };
-    let week = week.trim().parse::<i64>().map_err(|_| NO_TIME)?;
-    if (0..1024).contains(&week) {
-        return Err((
-            "has a week of GPS before August 1999, or one that is counted modulo 1024",
-            "add the weeks of the earlier rounds, 1024 or 2048, to the column, or convert it to dates",
-        ));
-    }
-    let since = number(of_week.trim(), unit)?;
-    let day = since.0.div_euclid(86_400 * SECOND);
-    if !(0..7).contains(&day) {
-        return Err(NO_TIME);
-    }
-    let days = jiff::Span::new().try_days(week.saturating_mul(7).saturating_add(day as i64));
-    let date = days
-        .and_then(|days| Date::constant(1980, 1, 6).checked_add(days))
-        .map_err(|_| NO_TIME)?;
-    let rest = since.0.rem_euclid(86_400 * SECOND);
-    Ok((date, (rest / SECOND) as i64, rest % SECOND))
 }
 
 /// The part of a date that a name means, behind the parts of other columns.

@@ -5,7 +5,7 @@ use crate::civil::{self, Zone, offset};
 pub(crate) use crate::civil::{AMBIGUOUS, NO_SUCH_DATE, Order, Problem};
 use crate::interval;
 use crate::number;
-use crate::parts::{Part, joined, of_week, padded, parts_of_second};
+use crate::parts::{Part, joined, padded, parts_of_second};
 use crate::quick;
 use crate::time::{DECIMALS, SECOND, Scale, Time, Unit};
 use jiff::civil::{Date, DateTime};
@@ -328,8 +328,7 @@ impl Clock {
             _ => return self.parse(&joined(cells)),
         };
         if let ([Part::Week, Part::OfWeek(decimals)], [week, behind]) = (meaning.as_slice(), cells) {
-            let (date, second, parts) = of_week(week, behind, *decimals)?;
-            return self.placed(date, second, parts, &Zone::Nothing);
+            return self.of_week(week, behind, *decimals);
         }
         let (mut parts, mut fraction) = ([0_i64, 1, 1, 0, 0, 0], 0);
         let (mut day_of_year, mut of_day) = (None, 0);

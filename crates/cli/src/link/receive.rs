@@ -10,10 +10,12 @@ use crate::{Ending, node, recording, serial};
 use fewbits_link::{Transport, Udp};
 use fewbits_recipes::unpack::Selection;
 use fewbits_record::BlockReader;
-use std::time::Duration;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
-/// Wait for a datagram without a time limit, before the next wait.
-const WAIT: Duration = Duration::from_secs(60);
+/// Longest wait for a datagram before it is looked whether a signal came.
+const WAIT: Duration = Duration::from_millis(200);
 
 /// Runs `receive`.
 pub(crate) fn run(options: &ReceiveOptions) -> Result<Ending, Error> {
@@ -63,12 +65,26 @@ fn receive_datagrams(options: &ReceiveOptions, address: &str) -> Result<Ending, 
         .map_err(of_socket)
         .map_err(Error::io(address, "listen"))?;
     say!("listening at {}", socket.address());
+    // A signal is the end: what did not arrive is counted.
+    let is_stopped = Arc::new(AtomicBool::new(false));
+    let stop = Arc::clone(&is_stopped);
+    crate::interrupt::on_stop(move || stop.store(true, Ordering::Relaxed));
     let ending = receive_frames(options, address, Senders::Any, || {
+        let begun = Instant::now();
         loop {
-            let arrived = socket.receive(options.timeout.unwrap_or(WAIT)).map_err(of_socket)?;
-            match arrived {
+            // What has arrived is taken before the end.
+            let is_last = is_stopped.load(Ordering::Relaxed);
+            let left = options.timeout.map(|timeout| timeout.saturating_sub(begun.elapsed()));
+            let wait = if is_last {
+                Duration::ZERO
+            } else {
+                left.unwrap_or(WAIT).min(WAIT)
+            };
+            match socket.receive(wait).map_err(of_socket)? {
                 Some((_, bytes)) => return Ok(Some(bytes.to_vec())),
-                None if options.timeout.is_some() => return Ok(None),
+                None if is_last || options.timeout.is_some_and(|timeout| begun.elapsed() >= timeout) => {
+                    return Ok(None);
+                }
                 None => {}
             }
         }

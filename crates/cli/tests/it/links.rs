@@ -9,7 +9,12 @@ use std::time::Duration;
 
 /// A receiver, and its address. It ends once nothing comes for a while.
 fn receiver(folder: &Path, words: &[&str]) -> (Child, String, std::thread::JoinHandle<String>) {
-    let all = [&["receive", "--udp", "127.0.0.1:0", "--timeout", "5s"], words].concat();
+    let timeout: &[&str] = if words.contains(&"--timeout") {
+        &[]
+    } else {
+        &["--timeout", "5s"]
+    };
+    let all = [&["receive", "--udp", "127.0.0.1:0"], timeout, words].concat();
     let mut receiver = start(folder, &all);
     let mut stderr = BufReader::new(receiver.stderr.take().unwrap());
     let mut line = String::new();
@@ -150,6 +155,23 @@ fn lost_end_is_a_failure() {
     assert!(said.contains("the end of the table did not arrive"), "{said}");
     let kept = std::fs::read_to_string(folder.path().join("day.csv")).unwrap();
     assert_eq!(kept, two_columns());
+}
+
+/// A signal is an end as good as a timeout: rows are kept, and what is missing is counted.
+#[cfg(unix)]
+#[test]
+fn signal_counts_what_did_not_arrive() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut all = datagrams(folder.path(), &two_columns(), &[]);
+    let lost = all.iter().position(|frame| frame[0] != 0).unwrap();
+    all.remove(lost);
+    let one = receiver(folder.path(), &["-o", "day.csv", "--timeout", "1h"]);
+    deliver(&one.1, all);
+    super::signal(&one.0, "-TERM");
+    let (output, said) = ended(one);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("did not arrive"), "{said}");
+    assert!(folder.path().join("day.csv").exists());
 }
 
 /// Noise, cut and inverted datagrams between those of a sender: its rows are all there, and nothing else.
