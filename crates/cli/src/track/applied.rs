@@ -18,7 +18,7 @@ pub(crate) struct Found {
     pub(super) change: f64,
     pub(super) time_constant: Option<f64>,
     pub(super) mean: f64,
-    pub(super) sensors: Vec<Sensor>,
+    pub(crate) sensors: Vec<Sensor>,
     /// Name, value and standard error of each parameter that was found; name and reason of each that was not.
     pub(super) estimates: Vec<(String, f64, f64)>,
     pub(super) refused: Vec<(String, String)>,
@@ -36,7 +36,7 @@ pub(crate) struct Found {
 pub(crate) struct Sensor {
     pub(crate) name: String,
     /// Of bits.
-    pub(super) threshold: Option<f64>,
+    pub(crate) threshold: Option<f64>,
     #[serde(flatten)]
     pub(crate) model: SensorModel,
 }
