@@ -44,6 +44,7 @@ pub(crate) struct DesignOptions {
         long,
         value_delimiter = ',',
         required_unless_present = "settings",
+        allow_negative_numbers = true,
         value_name = "DEVIATIONS"
     )]
     pub(crate) noise: Vec<f64>,
