@@ -9,6 +9,7 @@ use crate::numbers::{column, short};
 use crate::output;
 use crate::plot::{Layer, Picture};
 use crate::say::say;
+use crate::track::applied::{Found, Sensor};
 use fewbits_quantizer_design::solve::Rounded;
 use fewbits_quantizer_design::{AllowedCells, Prior, Progress, Solution};
 use fewbits_recipes::{self as recipe, design};
@@ -122,8 +123,50 @@ fn solve(options: &DesignOptions, prior: Prior) -> Result<Solution, Error> {
     Ok(solutions.best().clone())
 }
 
+/// The options with what the file of `--settings` says where they say nothing.
+fn applied(options: &DesignOptions) -> Result<DesignOptions, Error> {
+    let mut options = options.clone();
+    let Some(path) = &options.settings else {
+        return Ok(options);
+    };
+    let found = Found::read(path)?;
+    if options.noise.is_empty() {
+        options.noise = found.sensors.iter().map(Sensor::noise).collect();
+        for (number, sensor) in found.sensors.iter().enumerate() {
+            let model = &sensor.model;
+            let reads = match sensor.threshold {
+                // Its bits are designed, not those that it sent.
+                Some(_) => "the level".to_owned(),
+                None => format!("{} + {} times the level", short(model.bias), short(model.gain)),
+            };
+            say!(
+                "sensor {number}: {}, noise {} in the unit of the level; it reads {reads}",
+                sensor.name,
+                short(sensor.noise())
+            );
+        }
+        for (one, other, value, _) in &found.correlations {
+            say!(
+                "the noises of {one} and {other} have a correlation of {}: --correlation takes one of all pairs",
+                short(*value)
+            );
+        }
+    }
+    if options.file.is_none() && options.prior.is_none() {
+        options.prior = found.prior();
+        if options.prior.is_none() {
+            return Err(Error::Needed {
+                option: "a FILE or --prior",
+                reason: "the level of --settings wanders, so that it has no prior of its own",
+            });
+        }
+    }
+    Ok(options)
+}
+
 /// Runs the task.
 pub(crate) fn run(options: &DesignOptions) -> Result<Ending, Error> {
+    let options = &applied(options)?;
     let prior = match (&options.file, &options.prior) {
         (Some(file), _) => sample(options, file)?,
         (None, Some(text)) => design::prior(text).map_err(option)?,

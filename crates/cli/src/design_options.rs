@@ -25,7 +25,7 @@ pub(crate) enum Form {
     Rust,
 }
 
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(crate) struct DesignOptions {
     /// CSV file with a sample of the unknown in one column; `-` for standard input. Default: the prior of `--prior`.
     #[arg(conflicts_with = "prior")]
@@ -40,8 +40,17 @@ pub(crate) struct DesignOptions {
     #[arg(long, value_name = "PRIOR", allow_hyphen_values = true)]
     pub(crate) prior: Option<String>,
     /// Standard deviations of the sensors' noise in the unit of the unknown, one per sensor, as `1,1.5`.
-    #[arg(long, value_delimiter = ',', required = true, value_name = "DEVIATIONS")]
+    #[arg(
+        long,
+        value_delimiter = ',',
+        required_unless_present = "settings",
+        allow_negative_numbers = true,
+        value_name = "DEVIATIONS"
+    )]
     pub(crate) noise: Vec<f64>,
+    /// File of `fewbits fit -o`: noises in the unit of the level, and the prior of a level that returns to its mean, which other options do not state.
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) settings: Option<PathBuf>,
     /// Correlation of the noise of any two sensors.
     #[arg(long, default_value_t = 0.0, value_name = "RHO", allow_hyphen_values = true)]
     pub(crate) correlation: f64,

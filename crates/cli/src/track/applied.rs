@@ -1,4 +1,4 @@
-//! What `fit` found, as a file, and as settings of `track`.
+//! What `fit` found, as a file, and as settings of `track` and `design`.
 
 use super::instant::Reports;
 use crate::arguments::{Model, TrackOptions};
@@ -7,34 +7,78 @@ use crate::say::say;
 use fewbits_filters::fit::SensorModel;
 use fewbits_table::names::quoted;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// What was found. Other fields of the file are for people.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Found {
+pub(crate) struct Found {
     /// The sensor to which offsets are relative.
     pub(super) relative_to: String,
     /// Standard deviation of the level's change per root of a second.
     pub(super) change: f64,
     pub(super) time_constant: Option<f64>,
     pub(super) mean: f64,
-    pub(super) sensors: Vec<Sensor>,
+    pub(crate) sensors: Vec<Sensor>,
     /// Name, value and standard error of each parameter that was found; name and reason of each that was not.
     pub(super) estimates: Vec<(String, f64, f64)>,
     pub(super) refused: Vec<(String, String)>,
     /// Seconds after the first row at which the level jumps.
     #[serde(default)]
     pub(super) jumps: Vec<f64>,
+    /// Names, value and standard error of each correlation of noises.
+    #[serde(default)]
+    pub(crate) correlations: Vec<(String, String, f64, f64)>,
     pub(super) log_likelihood: f64,
 }
 
 /// A sensor of the file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Sensor {
-    pub(super) name: String,
+pub(crate) struct Sensor {
+    pub(crate) name: String,
     /// Of bits.
-    pub(super) threshold: Option<f64>,
+    pub(crate) threshold: Option<f64>,
     #[serde(flatten)]
-    pub(super) model: SensorModel,
+    pub(crate) model: SensorModel,
+}
+
+impl Found {
+    /// # Errors
+    /// If the file is none of `fit`, or a noise or gain is 0.
+    pub(crate) fn read(path: &Path) -> Result<Self, Error> {
+        let name = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(Error::io(&name, "read"))?;
+        let found: Self = serde_json::from_str(&text)
+            .map_err(|error| Error::content(&name, format_args!("it is no file of `fewbits fit -o`: {error}")))?;
+        for sensor in &found.sensors {
+            let noise = sensor.noise();
+            let is_usable = noise > 0.0 && noise.is_finite();
+            if !is_usable {
+                return Err(Error::content(
+                    &name,
+                    format_args!("sensor {}: noise and gain must not be 0", sensor.name),
+                ));
+            }
+        }
+        Ok(found)
+    }
+
+    /// Variance in the long run of a level that returns in so many seconds.
+    fn settled(&self, seconds: f64) -> f64 {
+        0.5 * self.change * self.change * seconds
+    }
+
+    /// Mean and standard deviation of the level in the long run, as a prior. `None` of a level that wanders.
+    pub(crate) fn prior(&self) -> Option<String> {
+        let variance = self.settled(self.time_constant?);
+        Some(format!("{}±{}", self.mean, variance.sqrt()))
+    }
+}
+
+impl Sensor {
+    /// Standard deviation of its noise in the unit of the level.
+    pub(crate) fn noise(&self) -> f64 {
+        self.model.noise / self.model.gain.abs()
+    }
 }
 
 /// What is subtracted from a sensor's values, and by what they are divided.
@@ -71,19 +115,13 @@ pub(super) fn applied(options: &TrackOptions, names: &[String]) -> Result<(Track
         return Ok((options, Vec::new()));
     };
     let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(Error::io(&name, "read"))?;
-    let found: Found = serde_json::from_str(&text)
-        .map_err(|error| Error::content(&name, format_args!("it is no file of `fewbits fit -o`: {error}")))?;
+    let found = Found::read(path)?;
     let mut corrections = Vec::new();
     let (mut noises, mut thresholds) = (Vec::new(), Vec::new());
     let is_there = |sensor: &&Sensor| names.is_empty() || names.contains(&sensor.name);
     for sensor in found.sensors.iter().filter(is_there) {
         let model = &sensor.model;
-        let is_usable = model.noise > 0.0 && model.noise.is_finite() && model.gain != 0.0 && model.gain.is_finite();
-        if !is_usable {
-            return Err(Error::content(&name, format_args!("sensor {}: noise and gain must not be 0", sensor.name)));
-        }
-        noises.push(format!("{}={}", quoted(&sensor.name), model.noise / model.gain.abs()));
+        noises.push(format!("{}={}", quoted(&sensor.name), sensor.noise()));
         match sensor.threshold {
             Some(threshold) => thresholds.push(format!("{}={threshold}", quoted(&sensor.name))),
             None => corrections.push(Correction {
@@ -112,14 +150,12 @@ pub(super) fn applied(options: &TrackOptions, names: &[String]) -> Result<(Track
     let is_walk = options.model.is_none_or(|model| model == Model::Walk);
     match found.time_constant {
         Some(seconds) if is_walk && options.change.is_none() => {
-            let variance = 0.5 * found.change * found.change * seconds;
+            let variance = found.settled(seconds);
             // The deviation from the forecast after a second.
             let after = (-variance * (-2.0 / seconds).exp_m1()).sqrt();
             options.model = Some(Model::Returning);
             options.change = Some(format!("{after}/1s"));
-            options
-                .prior
-                .get_or_insert(format!("{}±{}", found.mean, variance.sqrt()));
+            options.prior = options.prior.or(found.prior());
         }
         None if is_walk && options.change.is_none() => {
             options.change = Some(format!("{}/1s", found.change));

@@ -231,6 +231,11 @@ fn stored(found: &Fit, names: &[String], bits: &[usize]) -> Found {
             .map(|one| (title(one.quantity, names), one.reason.clone()))
             .collect(),
         jumps: found.jumps.clone(),
+        correlations: found
+            .correlations
+            .iter()
+            .map(|one| (names[one.sensors.0].clone(), names[one.sensors.1].clone(), one.value, one.standard_error))
+            .collect(),
         log_likelihood: found.log_likelihood,
     }
 }
@@ -271,6 +276,12 @@ fn page(
             "jumps of the level, which are no part of its change: {}, the first {} s after the first row\n",
             found.jumps.len(),
             short(first - begin.seconds)
+        );
+    }
+    for one in found.correlations.iter().filter(|one| one.is_certain()) {
+        text += &format!(
+            "{} and {} share noise: change, noises and their errors suppose that sensors do not, and are off by more than stated\n",
+            names[one.sensors.0], names[one.sensors.1]
         );
     }
     for one in &found.tests {

@@ -30,7 +30,7 @@
 //! | `told` | what its first ranges tell: height, and errors that grow |
 
 mod anchors;
-mod applied;
+pub(crate) mod applied;
 mod centre;
 mod columns;
 mod divisor;

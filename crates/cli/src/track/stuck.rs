@@ -126,7 +126,7 @@ impl Stuck {
             let (one, other) = (say::name(&names[*one]), say::name(&names[*other]));
             is_copy.then(|| {
                 format!(
-                    "{other} has the value of {one} in {} of {} rows with a new one: if it is a copy, it counts as a second measurement; \
+                    "{other} has the value of {one} in {} of {} rows with a new one: a copy is no second measurement; \
                      --without {} leaves it out",
                     pair.equal,
                     pair.rows,

@@ -209,3 +209,75 @@ fn numbers_for_gaps_copies_and_what_may_be_looked_for_are_told() {
     assert!(copied.contains("c has the value of a in") && !copied.contains("b has the value"), "{copied}");
     assert!(copied.contains("--find gain,slope,walk,delay,time-constant"), "{copied}");
 }
+
+/// Defects: errors of noises that sensors share were stated as if they did not; a copy of a column made a noise of a thousandth of what it is; `design` took no file of `fit`.
+#[test]
+fn shared_noise_copies_and_a_design_from_what_was_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let numbers = &mut Numbers(21);
+    let (mut level, mut table) = (0.0, "right,one,two,copy\n".to_owned());
+    for _ in 0..500 {
+        level += 0.5 * numbers.normal() - 0.05 * level;
+        let (right, shared) = (20.0 + level + 0.1 * numbers.normal(), 0.4 * numbers.normal());
+        let one = 20.0 + level + 0.3 * numbers.normal() + shared;
+        let two = 1.0 + 2.0 * (20.0 + level) + 0.6 * numbers.normal() + shared;
+        table += &format!("{right:.4},{one:.4},{two:.4},{one:.4}\n");
+    }
+    let words = [
+        "fit",
+        "-",
+        "--reference",
+        "right",
+        "--find",
+        "gain,time-constant",
+        "-o",
+        "found.json",
+    ];
+    let page = fewbits(folder.path(), &words, table.as_bytes());
+    let said = text(&page.stdout) + &text(&page.stderr);
+    assert!(said.contains("one and two share noise"), "{said}");
+    assert!(
+        said.contains("offset of copy: its readings repeat") && said.contains("no second measurement"),
+        "{said}"
+    );
+    let found: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("found.json")).unwrap()).unwrap();
+    let correlation = &found["correlations"][0];
+    assert!(
+        correlation[0] == "one" && correlation[1] == "two" && correlation[2].as_f64().unwrap() > 0.3,
+        "{found}"
+    );
+    // Noise in the unit of the level, and the level's own spread.
+    let words = ["design", "--settings", "found.json", "--bits", "1", "--json"];
+    let design = fewbits(folder.path(), &words, b"");
+    let json: serde_json::Value = serde_json::from_slice(&design.stdout).unwrap();
+    let (mean, noise) = (found["mean"].as_f64().unwrap(), found["sensors"][2]["noise"].as_f64().unwrap());
+    let gain = found["sensors"][2]["gain"].as_f64().unwrap();
+    let said = text(&design.stderr);
+    assert!((gain - 2.0).abs() < 0.1 && said.contains("sensor 2: two, noise"), "{said} {json}");
+    let change = found["change"].as_f64().unwrap();
+    let spread = (0.5 * change * change * found["time_constant"].as_f64().unwrap()).sqrt();
+    let prior = format!("{mean}±{spread}");
+    let deviations = (0..4).map(|at| {
+        let one = |name: &str| found["sensors"][at][name].as_f64().unwrap();
+        (one("noise") / one("gain").abs()).to_string()
+    });
+    let deviations = deviations.collect::<Vec<_>>().join(",");
+    let words = [
+        "design",
+        "--prior",
+        &prior,
+        "--noise",
+        &deviations,
+        "--bits",
+        "1",
+        "--json",
+    ];
+    let stated: serde_json::Value = serde_json::from_slice(&good(folder.path(), &words, b"")).unwrap();
+    let value = |one: &serde_json::Value| one["value"].as_f64().unwrap();
+    assert!((value(&stated) / value(&json)).ln().abs() < 1e-6 && noise > 0.0, "{stated} {json}");
+    // A level that wanders has no prior.
+    good(folder.path(), &["fit", "-", "-o", "walk.json"], table.as_bytes());
+    let none = refused(folder.path(), &["design", "--settings", "walk.json"], b"");
+    assert!(none.contains("--prior") && none.contains("wanders"), "{none}");
+}

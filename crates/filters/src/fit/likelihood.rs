@@ -19,7 +19,7 @@ impl LevelModel {
     /// If an instant names a sensor that the model does not have, a reading or a number of the model is not finite or out of range.
     pub fn log_likelihood(&self, instants: &[Instant]) -> Result<(f64, Vec<Vec<f64>>), Error> {
         self.check()?;
-        let scale = Scale::of(instants, self.sensors.len())?;
+        let scale = Scale::of(instants, &self.sensors)?;
         let mut residuals = vec![Vec::new(); self.sensors.len()];
         let readings = Readings::of(instants, self.sensors.len());
         let total = self.run(&readings, &scale, |sensor, score| residuals[sensor].push(score));
@@ -141,7 +141,7 @@ impl LevelModel {
             let (expected, variance) = filter.expected(one.sensor, model);
             let expected = expected + model.bias + model.slope * (one.seconds - scale.begin);
             let said = one.reading.said(expected, variance.max(0.0), model.noise, None)?;
-            let doubted = said.doubted(WILD, one.reading.wild(WILD, scale.range));
+            let doubted = said.doubted(WILD, one.reading.wild(WILD, scale.ranges[one.sensor]));
             product *= doubted.density;
             let is_in_range = (TINY..HUGE).contains(&product);
             if !is_in_range {

@@ -20,6 +20,7 @@ mod posterior;
 mod problem;
 mod readings;
 mod search;
+mod start;
 mod tests_of_fit;
 
 pub use model::{LevelModel, SensorModel};
@@ -28,8 +29,8 @@ pub use posterior::WeightedModel;
 pub use tests_of_fit::{Correlation, SensorTest};
 
 use crate::Error;
-use crate::calibration::{Instant, median};
-use fewbits_numerics::error::{positive, refuse};
+use crate::calibration::Instant;
+use fewbits_numerics::error::refuse;
 use model::Scale;
 use problem::Problem;
 use serde::{Deserialize, Serialize};
@@ -128,10 +129,13 @@ pub fn fit_watched(
 }
 
 fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn Fn() -> bool) -> Result<Fit, Error> {
-    Scale::of(instants, sensors)?;
+    Scale::of(instants, &vec![SensorModel::exact(1.0); sensors])?;
     // What does not vary says nothing of the level, and would be taken for it.
     let useless: Vec<Option<Refusal>> = (0..sensors)
-        .map(|sensor| useless(instants, sensor).filter(|_| request.reference != Some(sensor)))
+        .map(|sensor| {
+            let reason = useless(instants, sensor).or_else(|| copied(instants, sensor, sensors, request.reference));
+            reason.filter(|_| request.reference != Some(sensor))
+        })
         .collect();
     let of_use = |instant: &Instant| Instant {
         seconds: instant.seconds,
@@ -145,10 +149,10 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
     let all = instants;
     let kept: Vec<Instant> = all.iter().map(of_use).collect();
     let instants = kept.as_slice();
-    let scale = Scale::of(instants, sensors)?;
     let series: Vec<Vec<(f64, f64)>> = (0..sensors).map(|sensor| values_of(instants, sensor)).collect();
     let (relative_to, mut refused) = anchor(&series, all, request)?;
-    let start = start(&series, instants, &scale, relative_to, request)?;
+    let starts = start::starts(&series, instants, relative_to, request)?;
+    let scale = Scale::of(instants, &starts[0].sensors)?;
     let mut free = vec![Quantity::Change];
     let reason = |quantity, reason: &str| Refusal {
         quantity,
@@ -179,7 +183,7 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
             }
         }
     }
-    let mut problem = Problem::new(instants, scale, start, free).asking(goes_on);
+    let mut problem = Problem::new(instants, scale, starts, free).asking(goes_on);
     problem.solve();
     if request.time_constant {
         problem.try_time_constant(&mut refused);
@@ -191,8 +195,12 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
         problem.try_without_slopes(request.walk, &mut refused);
     }
     let spread = problem.spread();
-    let estimates = problem.errors(&spread, &mut refused);
+    let mut estimates = problem.errors(&spread, &mut refused);
     let posterior = problem.posterior(&spread);
+    // Of a long table the likelihood is a parabola, and the sample small.
+    if problem.part.is_none() {
+        estimates.iter_mut().for_each(|one| errors::widen(one, &posterior));
+    }
     let (log_likelihood, residuals) = problem.model.log_likelihood(instants)?;
     let jumps = problem.model.jumps(&problem.readings, &problem.scale);
     let tests = tests_of_fit::of(&residuals);
@@ -242,6 +250,27 @@ fn useless(instants: &[Instant], sensor: usize) -> Option<Refusal> {
     })
 }
 
+/// Whether a sensor repeats another one to the last digit: such readings are no second measurement.
+fn copied(instants: &[Instant], sensor: usize, sensors: usize, reference: Option<usize>) -> Option<Refusal> {
+    let repeats = |other: &usize| {
+        instants.iter().all(|instant| {
+            let of = |sensor: usize| instant.values.iter().filter(move |one| one.0 == sensor);
+            let own = of(sensor).map(|one| one.1.middle());
+            own.clone().next().is_none()
+                || (own.clone().all(|one| one.is_some()) && own.eq(of(*other).map(|one| one.1.middle())))
+        })
+    };
+    // Of sensors that repeat each other the first is kept.
+    let before = (0..sensors).filter(|other| *other < sensor || reference == Some(*other));
+    before
+        .filter(|other| *other != sensor)
+        .find(repeats)
+        .map(|other| Refusal {
+            quantity: Quantity::Bias(sensor),
+            reason: format!("its readings repeat those of sensor {other}, and are left out"),
+        })
+}
+
 /// The sensor to which all else is relative, and what cannot be found therefore.
 /// `all`: with the readings that are left out.
 fn anchor(series: &[Vec<(f64, f64)>], all: &[Instant], request: &Request) -> Result<(usize, Vec<Refusal>), Error> {
@@ -287,53 +316,4 @@ fn anchor(series: &[Vec<(f64, f64)>], all: &[Instant], request: &Request) -> Res
             reason: reason.to_owned(),
         });
     Ok((first, refused.collect()))
-}
-
-/// A first guess.
-fn start(
-    series: &[Vec<(f64, f64)>],
-    instants: &[Instant],
-    scale: &Scale,
-    anchor: usize,
-    request: &Request,
-) -> Result<LevelModel, Error> {
-    let rough = |values: &[(f64, f64)]| {
-        let steps: Vec<f64> = values.windows(2).map(|pair| (pair[1].1 - pair[0].1).abs()).collect();
-        let mean = steps.iter().sum::<f64>() / (steps.len() as f64).max(1.0);
-        let typical = median(steps);
-        // The deviation of a difference, from its median or its mean size.
-        let size = if typical > 0.0 { typical / 0.6745 } else { mean * 1.2533 };
-        let size = size / std::f64::consts::SQRT_2;
-        if size > 0.0 { size } else { 0.1 * scale.spread }
-    };
-    let own = rough(&series[anchor]);
-    let level = median(series[anchor].iter().map(|one| one.1).collect());
-    let mut sensors = Vec::with_capacity(series.len());
-    for (sensor, values) in series.iter().enumerate() {
-        let noise = match request.noises.get(sensor).copied().flatten() {
-            Some(known) => positive("noises", known)?,
-            None if values.is_empty() => 0.3 * scale.spread,
-            None => 0.7 * rough(values),
-        };
-        let mut model = SensorModel::exact(noise);
-        if sensor != anchor {
-            // Of bits, the level is as often above the threshold as below it.
-            let middle = median(values.iter().map(|one| one.1).collect());
-            model.bias = if values.is_empty() { -level } else { middle - level };
-        }
-        sensors.push(model);
-    }
-    let interval = median(
-        instants
-            .windows(2)
-            .map(|pair| pair[1].seconds - pair[0].seconds)
-            .collect(),
-    );
-    let interval = if interval > 0.0 { interval } else { 1.0 };
-    Ok(LevelModel {
-        change: 0.3 * own / interval.sqrt(),
-        time_constant: None,
-        mean: scale.middle,
-        sensors,
-    })
 }

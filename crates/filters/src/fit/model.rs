@@ -65,11 +65,12 @@ pub struct LevelModel {
     pub sensors: Vec<SensorModel>,
 }
 
-/// Numbers of the table that do not depend on the model.
-#[derive(Debug, Clone, Copy)]
+/// Numbers of the table that hardly depend on the model.
+#[derive(Debug, Clone)]
 pub(super) struct Scale {
-    /// Width of all values.
-    pub range: f64,
+    /// Width of the values of each sensor, all and without the outer ones.
+    pub ranges: Vec<f64>,
+    pub spreads: Vec<f64>,
     /// A middle and a width for the first level.
     pub middle: f64,
     pub spread: f64,
@@ -96,7 +97,7 @@ impl LevelModel {
     /// As [`log_likelihood`](Self::log_likelihood).
     pub fn first_level(&self, instants: &[Instant]) -> Result<(f64, f64), Error> {
         self.check()?;
-        let scale = Scale::of(instants, self.sensors.len())?;
+        let scale = Scale::of(instants, &self.sensors)?;
         let (mean, variance) = self.first(&scale);
         Ok((mean, variance.sqrt()))
     }
@@ -117,9 +118,9 @@ impl LevelModel {
 }
 
 impl Scale {
-    /// Checks the readings.
-    pub(super) fn of(instants: &[Instant], sensors: usize) -> Result<Self, Error> {
-        let mut numbers = Vec::new();
+    /// Checks the readings. The level is where the sensors of gain one read it, or where all do.
+    pub(super) fn of(instants: &[Instant], sensors: &[SensorModel]) -> Result<Self, Error> {
+        let mut numbers = vec![Vec::new(); sensors.len()];
         let mut before = f64::NEG_INFINITY;
         for instant in instants {
             if finite("seconds", instant.seconds)? < before {
@@ -128,27 +129,58 @@ impl Scale {
             before = instant.seconds;
             for (sensor, reading) in &instant.values {
                 reading.check()?;
-                if *sensor >= sensors {
-                    return refuse("sensor", sensor, format!("below {sensors}"));
-                }
-                numbers.extend(reading.middle());
+                let Some(own) = numbers.get_mut(*sensor) else {
+                    return refuse("sensor", sensor, format!("below {}", sensors.len()));
+                };
+                own.extend(reading.middle());
             }
         }
-        numbers.sort_by(f64::total_cmp);
-        let (range, middle, spread) = match (numbers.first(), numbers.last()) {
-            (Some(low), Some(high)) if high > low => {
-                let at = |share: f64| numbers[(share * (numbers.len() - 1) as f64) as usize];
-                let spread = 0.5 * (at(0.9) - at(0.1));
-                (high - low, at(0.5), if spread > 0.0 { spread } else { high - low })
-            }
-            // Bits alone.
-            _ => (1.0, 0.0, 1.0),
+        let levels = |is_of_use: &dyn Fn(f64) -> bool| {
+            let of_use = numbers.iter().zip(sensors).filter(|(_, model)| is_of_use(model.gain));
+            let levels = of_use.flat_map(|(own, model)| own.iter().map(|one| (one - model.bias) / model.gain));
+            Spread::of(levels.filter(|level| level.is_finite()).collect())
         };
+        // Otherwise bits alone.
+        let level = levels(&|gain| gain == 1.0).or_else(|| levels(&|_| true));
+        let level = level.unwrap_or(Spread {
+            range: 1.0,
+            middle: 0.0,
+            spread: 1.0,
+        });
+        let own: Vec<Spread> = numbers
+            .into_iter()
+            .map(|own| Spread::of(own).unwrap_or(level))
+            .collect();
         Ok(Self {
-            range,
-            middle,
-            spread,
+            middle: level.middle,
+            spread: level.spread,
+            ranges: own.iter().map(|one| one.range).collect(),
+            spreads: own.iter().map(|one| one.spread).collect(),
             begin: instants.first().map_or(0.0, |instant| instant.seconds),
+        })
+    }
+}
+
+/// Where numbers are, and how far apart.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Spread {
+    pub(super) range: f64,
+    pub(super) middle: f64,
+    /// Half the width without a tenth at either end.
+    pub(super) spread: f64,
+}
+
+impl Spread {
+    /// `None` if they do not vary.
+    pub(super) fn of(mut numbers: Vec<f64>) -> Option<Self> {
+        numbers.sort_by(f64::total_cmp);
+        let range = numbers.last()? - numbers.first()?;
+        let at = |share: f64| numbers[(share * (numbers.len() - 1) as f64) as usize];
+        let inner = 0.5 * (at(0.9) - at(0.1));
+        (range > 0.0).then(|| Self {
+            range,
+            middle: at(0.5),
+            spread: if inner > 0.0 { inner } else { range },
         })
     }
 }

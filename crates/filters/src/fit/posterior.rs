@@ -7,11 +7,13 @@ use fewbits_numerics::normal::quantile;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
-/// Models of a sample, in pairs that lie opposite to each other about the maximum; of a long table fewer.
-const MODELS: usize = 128;
+/// Models of a sample, in pairs that lie opposite to each other about the maximum: of a short table so many that they have this many readings
+/// together, within these limits, and of a long one fewer.
+const READINGS: usize = 200_000;
+const MODELS: [usize; 2] = [128, 512];
 const MODELS_OF_LONG: usize = 32;
 /// The sample is drawn so much wider than the readings leave open, since a posterior has heavier tails than the Gaussian at its maximum.
-const WIDER: f64 = 1.1;
+const WIDER: f64 = 1.25;
 /// Hypotheses, and models, of a smaller share than this are left out.
 const NEGLIGIBLE: f64 = 1e-4;
 
@@ -65,7 +67,7 @@ impl Problem<'_> {
     fn sample(&self, spread: &Spread, evidence: f64) -> Vec<WeightedModel> {
         let pairs = match self.part {
             Some(_) => MODELS_OF_LONG / 2,
-            None => MODELS / 2,
+            None => (READINGS / self.readings.told.len().max(1)).clamp(MODELS[0], MODELS[1]) / 2,
         };
         let mut all = Vec::with_capacity(2 * pairs);
         for pair in 0..pairs {

@@ -24,6 +24,8 @@ const LITTLE: f64 = 1e-6;
 const ENOUGH: f64 = 1e-2;
 /// Half of the delays that are tried, in half intervals between readings.
 const DELAYS: i32 = 12;
+/// The same of a first search, in whole intervals.
+const FAR_DELAYS: i32 = 64;
 
 /// Which parameters are there, with the values that fit best.
 pub(super) struct Hypothesis {
@@ -43,6 +45,7 @@ pub(super) struct Problem<'a> {
     pub(super) model: LevelModel,
     /// The first guess.
     guess: LevelModel,
+    starts: Vec<LevelModel>,
     pub(super) free: Vec<Quantity>,
     /// What explains the readings as well, or nearly.
     pub(super) left_out: Vec<Hypothesis>,
@@ -54,7 +57,9 @@ pub(super) struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    pub(super) fn new(instants: &'a [Instant], scale: Scale, model: LevelModel, free: Vec<Quantity>) -> Self {
+    /// `starts`: first guesses, at least one.
+    pub(super) fn new(instants: &'a [Instant], scale: Scale, starts: Vec<LevelModel>, free: Vec<Quantity>) -> Self {
+        let model = starts[0].clone();
         let gaps = instants
             .windows(2)
             .map(|pair| pair[1].seconds - pair[0].seconds)
@@ -68,6 +73,7 @@ impl<'a> Problem<'a> {
             is_rough: false,
             scale,
             guess: model.clone(),
+            starts,
             model,
             free,
             left_out: Vec::new(),
@@ -87,7 +93,7 @@ impl<'a> Problem<'a> {
         match quantity {
             Quantity::Bias(sensor) => self.model.sensors[sensor].noise,
             Quantity::Slope(sensor) => self.model.sensors[sensor].noise / self.length,
-            Quantity::Gain(_) => 0.1,
+            Quantity::Gain(sensor) => 0.1 * self.scale.spreads[sensor] / self.scale.spread,
             Quantity::Delay(_) => self.interval,
             _ => self.scale.spread,
         }
@@ -142,17 +148,15 @@ impl<'a> Problem<'a> {
     /// Climbs from several changes, each with the delays that fit best. Of a long table all but the last climb is about a part.
     pub(super) fn solve(&mut self) {
         self.is_rough = self.part.is_some();
-        let change = self.model.change;
-        let mut starts: Vec<(f64, LevelModel)> = [1e-2, 0.1, 1.0, 3.0, 10.0]
-            .map(|factor| {
-                let model = LevelModel {
-                    change: factor * change,
-                    ..self.model.clone()
-                };
-                self.with_best_delays(model, -DELAYS..=DELAYS, 0.5)
-            })
-            .into_iter()
-            .collect();
+        let mut starts = Vec::new();
+        for guess in &self.starts {
+            let (_, late) = self.with_best_delays(guess.clone(), -FAR_DELAYS..=FAR_DELAYS, 1.0);
+            for factor in [1e-2, 0.1, 1.0, 3.0, 10.0] {
+                let change = factor * guess.change;
+                let model = LevelModel { change, ..late.clone() };
+                starts.push(self.with_best_delays(model, -DELAYS..=DELAYS, 0.5));
+            }
+        }
         starts.sort_by(|one, other| other.0.total_cmp(&one.0));
         starts.truncate(CLIMBS);
         let mut best: Option<(f64, LevelModel)> = None;

@@ -45,6 +45,13 @@ pub struct Correlation {
     pub standard_error: f64,
 }
 
+impl Correlation {
+    /// Whether it differs from zero, as by chance once in a thousand times.
+    pub fn is_certain(&self) -> bool {
+        self.value.abs() > FAILED * self.standard_error
+    }
+}
+
 impl LevelModel {
     /// Whether the model explains the values of each sensor.
     ///

@@ -37,6 +37,7 @@ fn a_forecast_allows_for_the_errors_of_the_parameters() {
         };
         let best = of(&truth);
         let (point, averaged) = (best - of(&found.model), best - found.log_predictive(&rows, ROWS).unwrap());
+
         assert!(point > 20.0 && averaged < 6.0, "{seed}: {point} {averaged}");
         // Mean and deviation of the sample are those that are stated.
         let sum: f64 = found.posterior.iter().map(|one| one.weight).sum();
@@ -400,4 +401,87 @@ fn jumps_are_neither_change_nor_noise() {
         assert!(noises.clone().all(|(truth, own)| (own.noise / truth).ln().abs() < 0.2), "{seed}: {:?}", found.model);
         assert!(found.model.change < 0.06, "{seed}: {:?}", found.model);
     }
+}
+
+/// Defects: gains of 40 and of .002, and one of a sensor in another place of the scale, ended at 18, at 1 and at 1, with errors of a hundredth: the search began at a
+/// gain of 1, and the width of all values was that of the level. A delay of 20 readings was not reached.
+#[test]
+fn gains_of_any_size_and_long_delays_are_reached() {
+    let reference = Request {
+        reference: Some(0),
+        gain: true,
+        ..Request::default()
+    };
+    let near = |truth: &LevelModel, rows: &[Instant], request: &Request| {
+        let found = fit(rows, truth.sensors.len(), request).unwrap();
+        assert_eq!(found.refused, []);
+        for one in &found.estimates {
+            let off = (one.value - true_value(truth, one.quantity)) / one.standard_error;
+            assert!(off.abs() < 4.0, "{one:?} of {truth:?}");
+        }
+    };
+    for (mean, gain, bias) in [
+        (20.0, 40.0, 700.0),
+        (20.0, 2e-3, 0.7),
+        (20.0, -3.0, 0.0),
+        (1e9, 1.2, -1.2e9),
+    ] {
+        let other = SensorModel {
+            gain,
+            bias,
+            ..exact(0.4 * f64::abs(gain))
+        };
+        let truth = LevelModel {
+            mean,
+            ..walk(0.4, vec![exact(0.2), other])
+        };
+        near(&truth, &record(3, &truth, &[], ROWS), &reference);
+    }
+    let late = SensorModel {
+        gain: -0.7,
+        delay: 19.5,
+        ..exact(0.3)
+    };
+    let truth = walk(0.5, vec![exact(0.2), late]);
+    let request = Request {
+        delay: true,
+        ..reference
+    };
+    near(&truth, &record(4, &truth, &[], 2 * ROWS), &request);
+}
+
+/// Defect: the noise of a sensor that is there twice was found to be a thousandth of what it is.
+#[test]
+fn a_copy_is_no_second_measurement() {
+    let truth = walk(
+        0.5,
+        vec![
+            exact(0.3),
+            SensorModel {
+                bias: 1.0,
+                ..exact(0.5)
+            },
+        ],
+    );
+    let rows = record(2, &truth, &[], ROWS);
+    let plain = fit(&rows, 2, &Request::default()).unwrap();
+    let mut more = rows.clone();
+    for (row, instant) in more.iter_mut().enumerate() {
+        let copy = instant.values[0].1;
+        // Not of every row.
+        instant.values.extend((row % 3 != 0).then_some((2, copy)));
+    }
+    let found = fit(&more, 3, &Request::default()).unwrap();
+    assert_eq!((found.log_likelihood, &found.estimates), (plain.log_likelihood, &plain.estimates));
+    let reason = &found.refused.last().unwrap();
+    assert!(
+        reason.quantity == Quantity::Bias(2) && reason.reason.contains("repeat those of sensor 0"),
+        "{reason:?}"
+    );
+    // The reference stays.
+    let request = Request {
+        reference: Some(2),
+        ..Request::default()
+    };
+    assert_eq!(fit(&more, 3, &request).unwrap().relative_to, 2);
 }
