@@ -1,7 +1,6 @@
 //! What the readings leave open: standard errors at the maximum.
 
 use super::parameters::{Estimate, Quantity, Refusal};
-use super::posterior::WeightedModel;
 use super::problem::Problem;
 use super::search::information;
 use nalgebra::{DMatrix, DVector};
@@ -11,18 +10,6 @@ const UNDETERMINED_LOG: f64 = 2.0;
 const UNDETERMINED: f64 = 30.0;
 /// A step in a delay by which the likelihood falls by more than so many nats is halved.
 const FAR: f64 = 8.0;
-
-/// A standard error is at least the deviation of the posterior from what was found: that is larger where the likelihood is no parabola, as of a time
-/// constant of which the readings show few.
-pub(super) fn widen(estimate: &mut Estimate, posterior: &[WeightedModel]) {
-    let of = |one: &WeightedModel| Some((one.weight, estimate.quantity.of(&one.model)? - estimate.value));
-    let (mut sum, mut squares) = (0.0, 0.0);
-    for (weight, off) in posterior.iter().filter_map(of) {
-        sum += weight;
-        squares += weight * off * off;
-    }
-    estimate.standard_error = estimate.standard_error.max((squares / sum).sqrt());
-}
 
 /// The covariance of the parameters that the readings determine, in units of the search.
 pub(super) struct Spread {

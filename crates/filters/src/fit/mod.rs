@@ -199,7 +199,7 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
     let posterior = problem.posterior(&spread);
     // Of a long table the likelihood is a parabola, and the sample small.
     if problem.part.is_none() {
-        estimates.iter_mut().for_each(|one| errors::widen(one, &posterior));
+        estimates.iter_mut().for_each(|one| posterior::widen(one, &posterior));
     }
     let (log_likelihood, residuals) = problem.model.log_likelihood(instants)?;
     let jumps = problem.model.jumps(&problem.readings, &problem.scale);

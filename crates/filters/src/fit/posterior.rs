@@ -2,6 +2,7 @@
 
 use super::errors::Spread;
 use super::model::LevelModel;
+use super::parameters::Estimate;
 use super::problem::{Hypothesis, Problem};
 use fewbits_numerics::normal::quantile;
 use nalgebra::DVector;
@@ -24,6 +25,18 @@ pub struct WeightedModel {
     pub weight: f64,
     /// The model.
     pub model: LevelModel,
+}
+
+/// A standard error is at least the deviation of the posterior from what was found: that is larger where the likelihood is no parabola, as of a time
+/// constant of which the readings show few.
+pub(super) fn widen(estimate: &mut Estimate, posterior: &[WeightedModel]) {
+    let of = |one: &WeightedModel| Some((one.weight, estimate.quantity.of(&one.model)? - estimate.value));
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for (weight, off) in posterior.iter().filter_map(of) {
+        sum += weight;
+        squares += weight * off * off;
+    }
+    estimate.standard_error = estimate.standard_error.max((squares / sum).sqrt());
 }
 
 impl Problem<'_> {
