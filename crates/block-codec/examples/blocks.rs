@@ -129,7 +129,7 @@ fn main() -> Result<(), Failure> {
             };
             let n = recording.samples.len() as f64;
             let found = [
-                whole(recording, codec, delta, 1)?,
+                whole(recording, codec, delta, rounds)?,
                 whole(recording, codec.with_effort(Effort::Fast), delta, rounds)?,
                 plain_pco(recording, delta, rounds)?,
             ];

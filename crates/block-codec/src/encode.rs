@@ -22,8 +22,12 @@ const FEW: usize = 1;
 struct Shortest(Option<Vec<u8>>);
 
 impl Shortest {
+    fn length(&self) -> usize {
+        self.0.as_ref().map_or(usize::MAX, Vec::len)
+    }
+
     fn keep(&mut self, bytes: Vec<u8>) {
-        if self.0.as_ref().is_none_or(|best| bytes.len() < best.len()) {
+        if bytes.len() < self.length() {
             self.0 = Some(bytes);
         }
     }
@@ -77,15 +81,15 @@ impl BlockCodec {
         let mut best = Shortest::default();
         // Other columns may mislead the models: the shorter of both blocks is kept.
         let others = (!others.is_empty()).then(|| Others::new(others));
-        let few = |best: &Shortest| best.0.as_ref().is_some_and(|b| b.len() <= FEW * samples.len() / 8);
+        let few = |best: &Shortest| best.length() <= FEW * samples.len() / 8;
         for (i, grid) in self.grids(samples).into_iter().enumerate() {
             if i > 0 && few(&best) {
                 break;
             }
             self.encode_on(&grid, samples, others.as_ref(), &mut best)?;
         }
-        if best.0.as_ref().is_none_or(|b| b.len() > VERY_FINE * samples.len() / 8) {
-            if let Some(numbers) = smallest_pco(samples)? {
+        if best.length() > VERY_FINE * samples.len() / 8 {
+            if let Some(numbers) = smallest_pco(samples, best.length())? {
                 best.keep([self.head(None, Coding::Wrapped, false, &[]), numbers].concat());
             }
             let keys = samples.iter().map(|sample| levels::key_of_sample(*sample));
@@ -112,10 +116,10 @@ impl BlockCodec {
             shortest.keep(write_block(head(Coding::Models, true), true, grid, &indices, others)?);
         }
         // On coarse grids the models need far fewer bits. Try the general coder only if a sample takes many bits.
-        let is_fine = shortest.0.as_ref().is_none_or(|b| b.len() > FINE * samples.len() / 8);
+        let is_fine = shortest.length() > FINE * samples.len() / 8;
         let keys = indices.iter().map(|index| levels::key_of_index(*index));
         shortest.keep_levels(levels::levels(keys, self.effort), |joint| head(Coding::Levels, joint), others)?;
-        if is_fine && let Some(numbers) = smallest_pco(&indices)? {
+        if is_fine && let Some(numbers) = smallest_pco(&indices, shortest.length().min(best.length()))? {
             shortest.keep([head(Coding::Wrapped, false), numbers].concat());
         }
         shortest.0.into_iter().for_each(|bytes| best.keep(bytes));

@@ -262,16 +262,16 @@ impl Model {
         let inside = outside.simd_lt(Lanes::HALF).bitselect(Lanes::ONE - outside, beside);
         self.mixer.set_experts(inside, outside);
         if self.decide_one(coder, wanted.is_some_and(|j| (first..next).contains(&j))) {
-            return Ok(self.low_bits(coder, grid, first, wanted));
+            return Ok(self.low_bits(coder, grid, first, [low, high], wanted));
         }
         self.mixer.look_up(1, 1);
         self.mixer.set_experts(high.above, low.below);
         let up = self.decide_one(coder, wanted.is_some_and(|j| j >= next));
-        let side = |tails: Tails| if up { tails.above } else { tails.below };
+        let side = |tails: &Tails| if up { tails.above } else { tails.below };
         let is_beyond = |edge: i64| wanted.is_some_and(|j| if up { j >= edge } else { j < edge });
 
         // Outwards in growing steps: is the index at least this many cells away?
-        let mut near = side(if up { high } else { low });
+        let mut near = if up { high } else { low };
         let mut far;
         let (mut begin, mut width, mut count) = (1_i64, 1_i64, 0_usize);
         loop {
@@ -281,8 +281,8 @@ impl Model {
             let node = MAGNITUDES + 2 * count.min(18) as u32 + u32::from(up);
             self.mixer.look_up(node, CLASS_MAGNITUDES + count.min(3));
             let edge = grid.edge(begin + width, up);
-            far = side(self.tails(grid, edge));
-            self.mixer.set_experts(far, near - far);
+            far = self.tails(grid, edge);
+            self.mixer.set_experts(side(&far), side(&near) - side(&far));
             if !self.decide_one(coder, is_beyond(edge)) {
                 break;
             }
@@ -299,8 +299,9 @@ impl Model {
             self.mixer.look_up(INSIDE + depth, CLASS_INSIDE);
             let middle = begin + (end - begin) / 2;
             let edge = grid.edge(middle, up);
-            let between = side(self.tails(grid, edge));
-            self.mixer.set_experts(between - far, near - between);
+            let between = self.tails(grid, edge);
+            self.mixer
+                .set_experts(side(&between) - side(&far), side(&near) - side(&between));
             if self.decide_one(coder, is_beyond(edge)) {
                 (begin, near) = (middle, between);
             } else {
@@ -308,19 +309,29 @@ impl Model {
             }
             depth = (depth + 1).min(3);
         }
-        let cell = if up { begin } else { -begin };
-        Ok(self.low_bits(coder, grid, grid.first(cell), wanted))
+        let (cell, ends) = if up {
+            (begin, [near, far])
+        } else {
+            (-begin, [far, near])
+        };
+        Ok(self.low_bits(coder, grid, grid.first(cell), ends, wanted))
     }
 
-    /// Codes the position within a cell.
+    /// Codes the position within a cell, whose edges are its `ends`.
     #[inline(always)]
-    fn low_bits<C: Coder>(&mut self, coder: &mut C, grid: Grid, first: i64, wanted: Option<i64>) -> i64 {
+    fn low_bits<C: Coder>(
+        &mut self,
+        coder: &mut C,
+        grid: Grid,
+        first: i64,
+        [mut a, mut c]: [Tails; 2],
+        wanted: Option<i64>,
+    ) -> i64 {
         let mut index = first;
         for level in 0..grid.k.min(MODELLED) {
             self.mixer.look_up(LOW + level, CLASS_LOW);
             let half = 1 << (grid.k - level - 1);
-            let (a, b) = (self.tails(grid, index), self.tails(grid, index + half));
-            let c = self.tails(grid, index + 2 * half);
+            let b = self.tails(grid, index + half);
             // Probabilities of the upper and lower half from each expert's distribution. In the upper tail they come from the survival
             // function, which keeps its digits there.
             let is_upper = a.below.simd_ge(Lanes::HALF);
@@ -329,6 +340,9 @@ impl Model {
             self.mixer.set_experts(upper, lower);
             if self.decide_one(coder, wanted.is_some_and(|j| j >= index + half)) {
                 index += half;
+                a = b;
+            } else {
+                c = b;
             }
         }
         let left = grid.k.saturating_sub(MODELLED);
