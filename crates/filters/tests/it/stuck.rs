@@ -141,21 +141,23 @@ fn a_stuck_sensor_is_named_in_every_unit_and_after_a_restart() {
 /// Two wild values on both sides of the prediction contradict each other however wide it is: the level has not jumped to one of them.
 #[test]
 fn wild_values_that_contradict_each_other_are_no_jump() {
-    for seed in 0..200 {
+    for seed in 0..100 {
+        let variance = [0.01, 0.05, 0.3, 1.0][seed as usize % 4];
         let mut rng = Stream::new(seed).named("both wild").rng();
-        let mut centre = pair(0.01, &mut rng);
+        let mut centre = pair(variance, &mut rng);
+        let value = |rng: &mut dyn Rng, off: f64| variance.sqrt() * (off + noise(rng));
         for k in 1..=30_u32 {
             centre.advance(&mut rng, f64::from(k)).unwrap();
-            let (one, other) = (0.1 * noise(&mut rng), 0.1 * noise(&mut rng));
+            let (one, other) = (value(&mut rng, 0.0), value(&mut rng, 0.0));
             centre.receive(&mut rng, &[slot(0, one), slot(1, other)]).unwrap();
         }
         centre.advance(&mut rng, 31.0).unwrap();
-        let (below, above) = (-25.0 + noise(&mut rng), 25.0 + noise(&mut rng));
+        let (below, above) = (value(&mut rng, -250.0), value(&mut rng, 250.0));
         let events = centre
             .receive(&mut rng, &[slot(0, below), slot(1, above)])
             .unwrap()
             .events;
         assert!(!events.contains(&Event::Reopened), "{seed}: {below} {above} {events:?}");
-        assert!(centre.estimate().mean()[0].abs() < 1.0, "{seed}");
+        assert!(centre.estimate().mean()[0].abs() < 2.0, "{seed}");
     }
 }
