@@ -291,7 +291,7 @@ impl Coverage {
 /// The measurement of `docs/fit.md`. The bound is that of Bayes' rule with estimates that have the covariance of the Cramer-Rao bound and are told
 /// which faults are there: such an estimate is the truth plus a normal error, and a forecaster averages over as many errors about it.
 #[test]
-#[ignore = "ten minutes"]
+#[ignore = "four minutes"]
 fn held_out_readings_of_hundreds_of_worlds() {
     let said = std::thread::scope(|scope| {
         let kinds: Vec<_> = kinds()
@@ -376,6 +376,11 @@ fn measure((name, truth, bits, request): &(&'static str, LevelModel, Vec<usize>,
         said += &format!("  {quantity:?}: {share:.3} ± {error:.3} of {all} within 1.96 standard errors\n");
     }
     assert_eq!(faults, 0, "{name}");
+    for (quantity, within, all) in &coverage.0 {
+        // 95 in a hundred, less four standard errors of so many.
+        let least = 0.95 - 4.0 * (0.95 * 0.05 / *all as f64).sqrt();
+        assert!(*within as f64 >= least * *all as f64, "{quantity:?} {said}");
+    }
     // What is attainable, and two standard errors.
     assert!(more <= 2.0 * error, "{said}");
     said
