@@ -1,7 +1,7 @@
 //! Calibration: what a table of recorded readings says about its sensors and its level.
 
 use crate::centre::FusionCentre;
-use crate::error::{Outcome, refused};
+use crate::error::{Called, Outcome, refused};
 use crate::given::named;
 use crate::instants::{self, Long};
 use crate::model::Model;
@@ -134,7 +134,9 @@ pub(crate) fn fit(
             ControlFlow::Break(())
         }
     };
-    let found = py.detach(|| library::fit_watched(&rows, names.len(), &request, &watch))?;
+    let found = py
+        .detach(|| library::fit_watched(&rows, names.len(), &request, &watch))
+        .called(&[("noises", "noise")])?;
     let Some(found) = found else {
         let error = interrupted.into_inner().ok().flatten();
         return Err(error.unwrap_or_else(|| PyKeyboardInterrupt::new_err(())).into());

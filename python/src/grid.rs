@@ -1,7 +1,7 @@
 //! The exact filter of a scalar state on a grid, with the user's dynamics and likelihood as functions of all nodes at once.
 
 use crate::callbacks::{Likelihoods, returned};
-use crate::error::{Outcome, refused};
+use crate::error::{Called, Outcome, refused};
 use crate::given::named;
 use crate::nodes::{Kept, Parts, callable, dt_of, step};
 use crate::rows::Rows;
@@ -52,7 +52,8 @@ impl GridFilter {
         callable("deviation", deviation)?;
         let grid = UniformGrid::new(lower, upper, spacing)?;
         let belief = match start.extract::<(f64, f64)>() {
-            Ok((mean, deviation)) => PointMass::normal(grid, mean, deviation * deviation)?,
+            Ok((mean, deviation)) => PointMass::normal(grid, mean, deviation * deviation)
+                .called(&[("mean", "start"), ("variance", "start")])?,
             Err(_) => {
                 let density = returned("start", "node", start, grid.points())?;
                 let mut belief = PointMass::new(grid, |_| 0.0)?;

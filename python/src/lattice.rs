@@ -2,7 +2,7 @@
 
 use crate::array::{matrix, vector};
 use crate::callbacks::Likelihoods;
-use crate::error::{Failure, Outcome, refused};
+use crate::error::{Called, Failure, Outcome, refused};
 use crate::given::named;
 use crate::nodes::{Kept, Parts, callable, dt_of, step};
 use crate::rows::Rows;
@@ -65,7 +65,9 @@ impl LatticeFilter {
         let axes: Result<Vec<_>, _> = axes.map(|((l, u), s)| UniformGrid::new(*l, *u, *s)).collect();
         let axes = axes?;
         let belief = match start.extract::<(Vec<f64>, Vec<f64>)>() {
-            Ok((means, deviations)) => Lattice::normal(axes, &means, &deviations)?,
+            Ok((means, deviations)) => {
+                Lattice::normal(axes, &means, &deviations).called(&[("mean", "start"), ("deviation", "start")])?
+            }
             Err(_) => {
                 let made = Lattice::uniform(axes)?;
                 let flat = crate::array::flat("start", start)?;

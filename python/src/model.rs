@@ -1,7 +1,7 @@
 //! Models of the state by name: linear dynamics in continuous time, their dimension known at run time.
 
 use crate::array::{matrix, vector};
-use crate::error::{Outcome, refused};
+use crate::error::{Called, Outcome, refused};
 use crate::given::{named, of_class};
 use crate::stored::{self, Reduced};
 use fewbits_core::{Dynamics, Evolution, GaussianDynamics};
@@ -204,7 +204,10 @@ impl Model {
         #[pyo3(from_py_with = named)] time_constant: f64,
         #[pyo3(from_py_with = named)] variance: f64,
     ) -> Outcome<Self> {
-        Ok(Self::of(ContinuousLinear::ornstein_uhlenbeck(mean, time_constant, variance)?))
+        Ok(Self::of(
+            ContinuousLinear::ornstein_uhlenbeck(mean, time_constant, variance)
+                .called(&[("drift", "time_constant"), ("density", "variance")])?,
+        ))
     }
 
     /// Nearly constant velocity on a line: position, velocity. `density` is that of the acceleration.
@@ -284,7 +287,7 @@ impl Model {
             offset: sized("offset", offset.unwrap_or_else(|| vec![0.0; dimension]), dimension)?,
             interval: Some(interval),
         };
-        model.checked()
+        model.checked().called(&[("noise_covariance", "noise")])
     }
 
     /// This model and another side by side, independent of each other: the coordinates of this one, then those of the other.
@@ -405,8 +408,8 @@ pub(crate) fn covariance(
     match (deviation, covariance) {
         (Some(deviation), None) => {
             let deviation = sized("deviation", vector("deviation", deviation)?, dimension)?;
-            if let Some(bad) = deviation.iter().find(|x| x.is_nan() || **x < 0.0) {
-                return refused("deviation", bad, "numbers, 0 or above");
+            if let Some(bad) = deviation.iter().find(|x| !(**x >= 0.0 && (**x * **x).is_finite())) {
+                return refused("deviation", bad, "numbers, 0 or above, whose squares are finite");
             }
             let entry = |k: usize| match (k % dimension, k / dimension) {
                 (i, j) if i == j => deviation[i] * deviation[i],

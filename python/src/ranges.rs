@@ -1,6 +1,6 @@
 //! A target from the ranges of fixed anchors, over a table.
 
-use crate::error::{Outcome, refused};
+use crate::error::{Called, Outcome, refused};
 use crate::given::named;
 use crate::stored::{Reduced, maker};
 use crate::table::{Given, Table};
@@ -80,7 +80,7 @@ impl RangeTracker {
             settings,
             send: send.to_owned(),
         };
-        made.tracker()?;
+        made.tracker().called(&[("drift", "bias")])?;
         Ok(made)
     }
 

@@ -287,12 +287,18 @@ impl Rows {
             for block in playback.blocks_between(from, to) {
                 let batch = block.and_then(|mut block| {
                     keep_between(&mut block, from, to);
+                    if block.ticks.is_empty() {
+                        return Ok(None);
+                    }
                     if none {
                         block.columns.iter_mut().for_each(Vec::clear);
                     }
                     let batch = block.to_record_batch(&schema)?;
-                    Ok(clock::shown(&batch, &block.ticks, schema.time(), own.clone())?)
+                    Ok(Some(clock::shown(&batch, &block.ticks, schema.time(), own.clone())?))
                 });
+                let Some(batch) = batch.transpose() else {
+                    continue;
+                };
                 if batch.is_err() && damaged == Damaged::Skip {
                     continue;
                 }

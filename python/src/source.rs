@@ -1,7 +1,7 @@
 //! The search for a diffusing source: nodes that are asked one after the other.
 
 use crate::array::{matrix, shown, vector};
-use crate::error::{Outcome, refused};
+use crate::error::{Called, Outcome, refused};
 use crate::given::named;
 use crate::stored::{self, Reduced, maker};
 use crate::table::{Table, doubles};
@@ -443,8 +443,8 @@ impl SourceSearch {
                     SourceSensor::new(air, instants, given.noise)?
                 }
             };
-            let nodes = Deployment::given(given.places.clone())?;
-            let graph = Graph::within(nodes.positions(), given.reach)?;
+            let nodes = Deployment::given(given.places.clone()).called(&[("positions", "places")])?;
+            let graph = Graph::within(nodes.positions(), given.reach).called(&[("range", "reach")])?;
             Ok((SearchField::new(sensor.clone(), nodes, graph)?, sensor))
         })?;
         let search = SearchBox {
@@ -466,7 +466,8 @@ impl SourceSearch {
         let Some(place) = nodes.get(start) else {
             return refused("start", start, format!("0 to {}, a node", nodes.len().saturating_sub(1)));
         };
-        let mut search = Search::new(place, deviation, self.search, self.given.rate, self.given.threshold)?;
+        let mut search = Search::new(place, deviation, self.search, self.given.rate, self.given.threshold)
+            .called(&[("upper - lower", "box")])?;
         search.max_nodes = self.given.max_nodes;
         Ok(search)
     }

@@ -477,6 +477,66 @@ def test_numbers_out_of_range_and_of_other_types_are_named():
         fb.Model.walk(Failing())
 
 
+def one_bit(**changed):
+    return fb.OneBit(**{"a": 0.9, "process": 0.5, "noise": 1.0, **changed})
+
+
+def designed(**changed):
+    return fb.design(**{"prior": (0, 1), "noise": [1.0], "bits": [1], **changed})
+
+
+def source(**changed):
+    given = {"places": [[0.0, 0.0], [1.0, 0.0]], "reach": 2.0, "instants": [1.0], "noise": 1.0, "diffusivity": 1.0, "rate": 1.0}
+    return fb.SourceSearch(**{**given, "box": ((0, 0), (1, 1)), **changed})
+
+
+def gridded(**changed):
+    grid = {"lower": -2, "upper": 2, "spacing": 0.5, "start": (0, 1), **changed}
+    return fb.GridFilter(lambda x, dt: x, lambda x, dt: 1.0, lambda x, z: -np.abs(x), **grid)
+
+
+@pytest.mark.parametrize(
+    ("name", "call"),
+    [
+        ("a", lambda: one_bit(a=math.nan)),
+        ("process", lambda: one_bit(process=-1.0)),
+        ("noise", lambda: one_bit(noise=0.0)),
+        ("flips", lambda: one_bit(flips=0.7)),
+        ("samples", lambda: one_bit().run([math.inf], mean=0, variance=1)),
+        ("time_constant", lambda: fb.Model.reverting(mean=0, time_constant=1e-320, variance=1)),
+        ("variance", lambda: fb.Model.reverting(mean=0, time_constant=1e-9, variance=1e300)),
+        ("noise", lambda: fb.Model.steps([[1.0]], [[-1.0]])),
+        ("deviation", lambda: fb.FusionCentre(fb.Model.walk(0.1), mean=0, deviation=1e200)),
+        ("failures", lambda: fb.FusionCentre(fb.Model.walk(0.1), mean=0, deviation=1, failures=-1.0)),
+        ("noise", lambda: fb.FusionCentre(fb.Model.walk(0.1), mean=0, deviation=1).join("a", noise=1e200)),
+        ("bias", lambda: fb.RangeTracker({"a": (0.0, 0.0), "b": (9.0, 0.0), "c": (0.0, 9.0)}, bias=math.inf)),
+        ("prior", lambda: designed(prior=(math.nan, 1))),
+        ("prior", lambda: designed(prior=(0, -1))),
+        ("noise", lambda: designed(noise=[-1.0])),
+        ("noise", lambda: designed(noise=[], bits=[])),
+        ("flips", lambda: designed(flips=0.7)),
+        ("start", lambda: gridded(start=(math.nan, 1))),
+        ("start", lambda: gridded(start=(0, -1e200))),
+        ("places", lambda: source(places=[[math.nan, 0.0]])),
+        ("reach", lambda: source(reach=-1.0)),
+        ("instants", lambda: source(instants=[0.0])),
+        ("box", lambda: source(box=((1, 1), (0, 0)))),
+        ("noise", lambda: fb.fit(fb.Table({"t": np.arange(30.0), "a": np.sin(np.arange(30.0))}), time="t", noise={"a": -1.0})),
+    ],
+)
+def test_refused_arguments_have_the_names_of_python(name, call):
+    with pytest.raises(fb.ArgumentError) as caught:
+        call()
+    assert caught.value.name == name, caught.value
+
+
+def test_huge_and_tiny_numbers_are_shown_with_an_exponent():
+    for number in [-1.7e308, -1e-320]:
+        with pytest.raises(fb.ArgumentError) as caught:
+            fb.Model.walk(number)
+        assert float(caught.value.value) == number and len(caught.value.value) < 12
+
+
 @pytest.mark.parametrize("key", [1, None, b"a", ("a",), "\ud800"])
 @pytest.mark.parametrize(
     ("name", "call"),

@@ -266,6 +266,19 @@ def test_a_lazy_frame_reads_only_what_it_needs(tmp_path):
     assert _range((pl.col("row") >= 5) | (pl.col("row") < 2), "row", True) == (None, None)
 
 
+@pytest.mark.parametrize("columns", [["a"], [], None])
+def test_some_columns_of_no_rows_are_an_empty_table(tmp_path, columns):
+    path = tmp_path / "room.fewb"
+    fb.write(fb.Table({"t": np.arange(30.0), "a": np.arange(30.0), "b": np.arange(30.0)}), path, time="t")
+    names = ["t", *(["a", "b"] if columns is None else columns)]
+    for start, end in [(100, 200), (20, 10), (5.5, 5.75), (-9, -1)]:
+        empty = fb.read(path, columns=columns, start=start, end=end)
+        assert empty.columns == names and len(empty) == 0
+        with fb.open(path) as recording:
+            assert list(recording.select(columns, start=start, end=end)) == []
+    assert fb.read(path, columns=columns, start=20, end=22)["t"].tolist() == [20, 21]
+
+
 def test_rows_come_block_by_block(tmp_path):
     path, n = tmp_path / "a.fewb", 200_000
     fb.write(pl.DataFrame({"a": np.arange(n) * 1.0}), path, effort="fast")

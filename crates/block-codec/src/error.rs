@@ -13,12 +13,12 @@ pub struct ArgumentError {
 }
 
 impl ArgumentError {
-    /// Builds the error from any printable value.
+    /// Builds the error from any printable value. A number that takes more than 24 characters is written with an exponent.
     #[cold]
     pub fn new(name: &'static str, value: impl std::fmt::Display, expected: impl Into<String>) -> Self {
         Self {
             name,
-            value: value.to_string(),
+            value: short(value.to_string()),
             expected: expected.into(),
         }
     }
@@ -48,6 +48,13 @@ impl ArgumentError {
     }
 }
 
+fn short(value: String) -> String {
+    match value.parse::<f64>() {
+        Ok(number) if value.len() > 24 => format!("{number:e}"),
+        _ => value,
+    }
+}
+
 /// Bytes that are not what a writer writes.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{field}` is {value}: expected {expected}")]
@@ -61,7 +68,7 @@ pub struct Damaged {
 }
 
 impl Damaged {
-    /// Builds the error from any printable value.
+    /// Builds the error from any printable value. A number that takes more than 24 characters is written with an exponent.
     #[cold]
     pub fn new(field: &'static str, value: impl std::fmt::Display, expected: &'static str) -> Self {
         Self {

@@ -45,6 +45,9 @@ impl SourceSensor {
     pub fn new(model: impl SourceModel + Send + Sync + 'static, instants: Vec<f64>, noise: f64) -> Result<Self, Error> {
         at_least_one("instants", instants.len())?;
         all_finite("instants", &instants)?;
+        if instants.iter().all(|t| *t <= 0.0) {
+            return refuse("instants", "none above 0", "at least one after the release began");
+        }
         positive("noise", noise)?;
         let sensor = Self {
             model: Arc::new(model),

@@ -4,7 +4,7 @@ use crate::Error;
 use fewbits_core::Gaussian;
 use fewbits_filters::{ScalarSteadyState, scalar_steady_state};
 use fewbits_models::{Ar1, LinearSensor};
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{ArgumentError, non_negative, positive};
 use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_2_PI;
@@ -56,6 +56,7 @@ impl ScalarPlant {
     /// # Errors
     /// If `|a| > 1` or anything else is out of range.
     pub fn new(coefficient: f64, process_variance: f64, measurement_variance: f64) -> Result<Self, Error> {
+        non_negative("process_variance", process_variance)?;
         Self::of(Ar1::new(coefficient, process_variance)?, measurement_variance)
     }
 
@@ -64,6 +65,7 @@ impl ScalarPlant {
     /// # Errors
     /// [`Error::Argument`] if an argument is not finite or a variance is out of range.
     pub fn new_unstable(coefficient: f64, process_variance: f64, measurement_variance: f64) -> Result<Self, Error> {
+        non_negative("process_variance", process_variance)?;
         Self::of(Ar1::new_unstable(coefficient, process_variance)?, measurement_variance)
     }
 
@@ -78,7 +80,7 @@ impl ScalarPlant {
     fn of(dynamics: Ar1, measurement_variance: f64) -> Result<Self, Error> {
         Ok(Self {
             dynamics,
-            sensor: LinearSensor::direct(measurement_variance)?,
+            sensor: LinearSensor::direct(positive("measurement_variance", measurement_variance)?)?,
         })
     }
 

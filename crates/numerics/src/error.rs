@@ -18,14 +18,21 @@ pub struct ArgumentError {
 }
 
 impl ArgumentError {
-    /// Builds the error from any printable value.
+    /// Builds the error from any printable value. A number that takes more than 24 characters is written with an exponent.
     #[cold]
     pub fn new(name: &'static str, value: impl std::fmt::Display, expected: impl Into<String>) -> Self {
         Self {
             name,
-            value: value.to_string(),
+            value: short(value.to_string()),
             expected: expected.into(),
         }
+    }
+}
+
+fn short(value: String) -> String {
+    match value.parse::<f64>() {
+        Ok(number) if value.len() > 24 => format!("{number:e}"),
+        _ => value,
     }
 }
 
@@ -135,4 +142,19 @@ pub fn probabilities(name: &'static str, values: &[f64]) -> Result<(), ArgumentE
         return Err(ArgumentError::new(name, format!("a vector summing to {sum}"), "probabilities that sum to 1"));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ArgumentError;
+
+    #[test]
+    fn long_numbers_have_an_exponent_and_long_texts_stay() {
+        let shown = |value: &dyn std::fmt::Display| ArgumentError::new("x", value, "a number").value;
+        assert_eq!(shown(&1.5e300), "1.5e300");
+        assert_eq!(shown(&-1e-320), format!("{:e}", -1e-320));
+        assert_eq!(shown(&0.1), "0.1");
+        let text = "a value of more than twenty-four characters";
+        assert_eq!(shown(&text), text);
+    }
 }
