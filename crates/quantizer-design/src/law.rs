@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::outcomes::counts::Compositions;
-use crate::outcomes::{Table, cell_probabilities};
+use crate::outcomes::{SETTLED, Table, cell_probabilities};
 use crate::system::{SensorGroup, System};
 use fewbits_numerics::normal;
 
@@ -91,7 +91,11 @@ impl<'a> Active<'a> {
             .flat_map(|b| self.means.iter().map(move |m| (b - m) / self.deviation));
         let (densities, slopes) = standardised
             .map(|u| {
-                let density = normal::pdf(u) / self.deviation;
+                let density = if u.abs() > SETTLED {
+                    0.0
+                } else {
+                    normal::pdf(u) / self.deviation
+                };
                 (density, -u * density / self.deviation)
             })
             .unzip();

@@ -92,7 +92,7 @@ impl Task {
 }
 
 /// A noise that changes no design: a two-hundredth of the prior's deviation, or of points a thousandth of the smallest gap between them.
-/// It moves the breakpoints of a normal prior by a hundred-thousandth of its deviation. The time of a design grows as its reciprocal.
+/// It moves the breakpoints of a normal prior by a hundred-thousandth of its deviation.
 pub fn negligible(prior: &Prior) -> f64 {
     let Some((values, _)) = prior.points() else {
         return 5e-3 * prior.deviation();

@@ -35,6 +35,10 @@ const ENTROPY_STEP: f64 = 0.2;
 /// The same for products of cell probabilities of two sensors, which are entire functions. With more sensors they are sharper.
 const PRODUCT_STEP: f64 = 0.4;
 
+/// The smallest independent noise with which designs are searched, as a share of the deviation of a normal prior or of the narrowest part
+/// of a mixture. It moves breakpoints by less than 1e-4 of that deviation, which Newton's method on the exact model mends.
+const SEARCHED: f64 = 1e-2;
+
 /// The prior of the unknown and the noise of all sensors, on quadrature nodes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "StoredModel", into = "StoredModel")]
@@ -151,6 +155,22 @@ impl ObservationModel {
             mean,
             variance,
         })
+    }
+
+    /// The model on which designs are searched: independent noises below [`SEARCHED`] are raised to it, since the number of nodes grows as
+    /// their reciprocal.
+    pub(crate) fn searched(&self) -> Result<Self, Error> {
+        match self.prior.finest() {
+            Some(finest) if self.noise.is_independent() => {
+                let noise = self.noise.at_least(SEARCHED * finest)?;
+                if noise == self.noise {
+                    Ok(self.clone())
+                } else {
+                    Self::new(self.prior.clone(), noise)
+                }
+            }
+            _ => Ok(self.clone()),
+        }
     }
 
     /// A Gaussian prior and sensors with independent noise, all given by their standard deviations.

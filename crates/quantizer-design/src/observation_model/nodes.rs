@@ -59,6 +59,23 @@ impl Prior {
         Ok((values, weights))
     }
 
+    /// Deviation of the narrowest part of the prior; nothing for points and tables.
+    pub(super) fn finest(&self) -> Option<f64> {
+        match &self.shape {
+            Shape::Gaussian { deviation, .. } => Some(*deviation),
+            Shape::Uniform { .. } => Some(self.deviation()),
+            Shape::Mixture { .. } | Shape::Sample { .. } => {
+                let bells = self.bells().into_iter();
+                Some(
+                    bells
+                        .map(|(_, _, deviation)| deviation)
+                        .fold(self.deviation(), f64::min),
+                )
+            }
+            Shape::Table { .. } | Shape::Discrete { .. } => None,
+        }
+    }
+
     /// The range of the quadrature; the probability outside is negligible.
     pub(super) fn support(&self, resolution: Resolution) -> (f64, f64) {
         match &self.shape {

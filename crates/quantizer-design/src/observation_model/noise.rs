@@ -165,6 +165,12 @@ impl Noise {
         Self::one_factor_with_deviations(&times(&self.loadings), &times(&self.residuals))
     }
 
+    /// The noise whose part of each sensor's own has at least the deviation `least`.
+    pub(super) fn at_least(&self, least: f64) -> Result<Self, Error> {
+        let residuals: Vec<f64> = self.residuals.iter().map(|d| d.max(least)).collect();
+        Self::one_factor_with_deviations(&self.loadings, &residuals)
+    }
+
     /// Whether the noises of the sensors are independent.
     pub fn is_independent(&self) -> bool {
         self.sensors() == 1 || self.loadings.iter().filter(|a| **a != 0.0).count() < 2

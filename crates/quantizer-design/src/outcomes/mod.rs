@@ -29,5 +29,5 @@ mod table;
 
 pub(crate) use sums::moments_until;
 pub use sums::{explained, for_each, for_each_log, moments};
-pub(crate) use table::add_scaled;
 pub use table::{Feature, Table, cell_probabilities, dot};
+pub(crate) use table::{SETTLED, add_scaled, intervals};

@@ -9,8 +9,7 @@ use crate::deadline::Deadline;
 use crate::error::Error;
 use crate::law::negative_entropy;
 use crate::observation_model::{ObservationModel, Resolution};
-use crate::outcomes::{Feature, Table, add_scaled, cell_probabilities, dot, moments_until};
-use fewbits_numerics::kernels;
+use crate::outcomes::{Feature, Table, add_scaled, cell_probabilities, dot, intervals, moments_until};
 use fewbits_quantizers::Channel;
 
 /// Half-width of the table of a sample, in its standard deviations.
@@ -74,7 +73,7 @@ impl Sample {
         let at = |y: &f64| {
             let mut below = vec![f64::NEG_INFINITY; model.values.len()];
             let upper: Vec<f64> = model.values.iter().map(|x| (y - x) / noise).collect();
-            kernels::interval(&mut below, &upper);
+            intervals(&mut below, &upper);
             dot(&below, &model.weights)
         };
         Self {

@@ -9,6 +9,7 @@ use super::solution::{Solution, Solutions};
 use super::starts::Search;
 use crate::criterion::Criterion;
 use crate::error::{Error, refuse};
+use crate::observation_model::ObservationModel;
 use fewbits_numerics::error::entries;
 
 impl Request<'_> {
@@ -19,8 +20,10 @@ impl Request<'_> {
     /// the sensors can send; [`Error::TooLarge`] if the sensors have more joint symbols than can be enumerated.
     pub fn run(mut self) -> Result<Solutions, Error> {
         let mut control = Control::new(self.clock, self.time_limit, self.progress.take());
+        let searched = self.model.searched()?;
+        let exact = std::mem::replace(&mut self.model, searched);
         let bits = self.checked_bits(&mut control)?;
-        let mut found = self.solve(&bits, &mut control)?;
+        let mut found = self.solve(&exact, &bits, &mut control)?;
         let sense = self.criterion.sense();
         found.sort_by(|a, b| (sense * b.value).total_cmp(&(sense * a.value)));
         Ok(Solutions {
@@ -65,10 +68,11 @@ impl Request<'_> {
         Ok(bits)
     }
 
-    fn solve(&self, bits: &[u32], control: &mut Control<'_>) -> Result<Vec<Solution>, Error> {
+    /// Solutions of the `exact` model, from a search on that of the request.
+    fn solve(&self, exact: &ObservationModel, bits: &[u32], control: &mut Control<'_>) -> Result<Vec<Solution>, Error> {
         let participants = SensorDesign::all(bits, &self.links);
         let sensors: Vec<usize> = participants.iter().map(|p| p.sensor).collect();
-        let model = self.model.subset(&sensors)?;
+        let (model, exact) = (self.model.subset(&sensors)?, exact.subset(&sensors)?);
         let given = self
             .start
             .as_ref()
@@ -95,7 +99,7 @@ impl Request<'_> {
         for (done, cells) in searched.designs.into_iter().enumerate() {
             control.report(Stage::Certificate, done, parts);
             let deadline = control.deadline();
-            found.push(polish(&model, self.criterion, &participants, cells, searched.apart, deadline)?);
+            found.push(polish(&exact, self.criterion, &participants, cells, searched.apart, deadline)?);
         }
         control.report(Stage::Certificate, parts, parts);
         Ok(found)

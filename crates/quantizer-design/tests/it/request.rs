@@ -509,3 +509,17 @@ fn requests_that_do_not_fit_are_refused() {
         assert!(error.contains(what), "{error}");
     }
 }
+
+/// Without noise, sensors of several intervals divide the axis at all their breakpoints together: the best are those of one Lloyd-Max
+/// quantizer. Max (1960) has the distortions of 3, 4 and 7 levels.
+#[test]
+fn precise_sensors_share_the_breakpoints_of_one_quantizer() {
+    for (bits, distortion) in [(vec![1, 1], 0.1902), (vec![2], 0.11748), (vec![2, 2], 0.0440)] {
+        for (unit, noise) in [(1.0, 1e-3), (1e6, 2e-4)] {
+            let noise = Noise::independent_with_deviations(&vec![unit * noise; bits.len()]).unwrap();
+            let model = ObservationModel::new(Prior::normal(3.0 * unit, unit).unwrap(), noise).unwrap();
+            let value = best(model, BitBudget::PerSensor(bits.clone()), Link::PERFECT).value / (unit * unit);
+            assert!((value - distortion).abs() < 1e-4, "{bits:?}: {value}");
+        }
+    }
+}
