@@ -77,7 +77,7 @@ impl UniformGrid {
         let intervals = ((upper - lower) / spacing).ceil();
         if !(1.0..MAX_NODES as f64).contains(&intervals) {
             let expected = "an interval that holds 1 to a million spacings";
-            return refuse("grid", format!("[{lower}, {upper}] by {spacing}"), expected);
+            return refuse("grid", format!("[{lower:?}, {upper:?}] by {spacing:?}"), expected);
         }
         Self::of_nodes(lower, spacing, intervals as usize + 1)
     }
