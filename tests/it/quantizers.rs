@@ -186,7 +186,7 @@ fn iterations_of_newton_and_of_alternating_maximisation() {
     // The last iteration only confirms that the step vanished.
     agree("mi-beyond", "newton", "", |row| newton(row).iterations as f64 - 1.0);
     agree("mi-beyond", "alternating", "", |row| {
-        let limit = newton(row).quantizers();
+        let limit = newton(row).system.quantizers();
         let (mut current, mut steps) = (start(row), 0);
         while apart(&current.quantizers()[0], &limit[0]) > 1e-8 && steps < 1000 {
             let quantizer = baselines::alternating_step(&current, 0, MI).unwrap();
@@ -215,7 +215,7 @@ fn nine_sensors_in_different_groups_return_to_one_quantizer() {
                 }
             };
             let groups = sizes.iter().enumerate().map(group).collect();
-            let end = joint(&System::new(sensors(9), groups).unwrap(), criterion).quantizers();
+            let end = joint(&System::new(sensors(9), groups).unwrap(), criterion).system.quantizers();
             assert!(end.iter().all(|q| apart(q, &end[0]) <= 1e-6), "{levels} levels, {sizes:?}, {criterion:?}");
         }
     }

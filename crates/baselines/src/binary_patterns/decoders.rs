@@ -119,7 +119,7 @@ fn exact_division_map(bank: &Bank, grid: &Quantizer, outcomes: usize) -> Vec<f64
     for cell in &cells {
         nodes.x.extend(&cell.nodes.x);
         nodes.w.extend(&cell.nodes.w);
-        ends.push(nodes.len());
+        ends.push(nodes.x.len());
     }
     let mut estimates = vec![0.0; outcomes];
     let mut score = vec![0.0; cells.len()];

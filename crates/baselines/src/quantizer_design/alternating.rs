@@ -237,7 +237,7 @@ mod tests {
         let fast =
             fewbits_quantizer_design::design::joint(&start, criterion, &fewbits_quantizer_design::Newton::default())
                 .unwrap();
-        let (a, b) = (slow.system.quantizers(), fast.quantizers());
+        let (a, b) = (slow.system.quantizers(), fast.system.quantizers());
         assert!((a[0].breakpoints()[2] - b[0].breakpoints()[2]).abs() < 1e-10);
         assert!(slow.iterations > 5 * fast.iterations, "{} {}", slow.iterations, fast.iterations);
         let short = Alternating {

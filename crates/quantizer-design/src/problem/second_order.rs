@@ -2,8 +2,8 @@
 
 use super::{Problem, Slot};
 use crate::criterion::LOG_FLOOR;
-use crate::derivatives::Derivatives;
 use crate::law::Active;
+use crate::newton::Derivatives;
 use crate::outcomes::axis::{Axis, reduce, scatter, slice};
 use crate::outcomes::{Table, dot};
 use nalgebra::{DMatrix, DVector};

@@ -62,8 +62,13 @@ impl SensorDesign {
         }
     }
 
+    /// The channels of several sensors.
+    pub(super) fn laws(sensors: &[Self]) -> Result<Vec<Channel>, Error> {
+        sensors.iter().map(Self::law).collect()
+    }
+
     /// The channel from words to received symbols: the words, and one more symbol "missing" if the link can lose words.
-    pub(super) fn law(&self) -> Result<Channel, Error> {
+    fn law(&self) -> Result<Channel, Error> {
         let words = 1u64 << self.bits;
         let received = |t: u64| {
             let arrives = |w: u64| self.link.arrival() * self.link.word_probability(w, t, self.bits);
@@ -160,10 +165,7 @@ pub(super) fn system_of(
     cells: &[WordedCells],
     apart: bool,
 ) -> Result<System, Error> {
-    let laws = participants
-        .iter()
-        .map(SensorDesign::law)
-        .collect::<Result<Vec<_>, _>>()?;
+    let laws = SensorDesign::laws(participants)?;
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for n in 0..participants.len() {
         // Sensors of equal design, link and noise form a group, whose outcomes are counts.

@@ -158,14 +158,6 @@ impl Solution {
         &self.system
     }
 
-    /// `E (X - E[X | T])^2`, in squared units.
-    ///
-    /// # Errors
-    /// As [`System::value`].
-    pub fn mean_squared_error(&self) -> Result<f64, Error> {
-        self.system.value(Criterion::MeanSquaredError)
-    }
-
     /// Relative distance of the value from the bound; 0 is optimal. `None` without a bound, and of a value above a bound of 0.
     pub fn gap(&self) -> Option<f64> {
         let bound = self.bound?.value;
@@ -283,9 +275,8 @@ fn tightest_bound(system: &System, sensors: &[SensorDesign], criterion: Criterio
     match criterion {
         Criterion::MutualInformation => found.push((total * std::f64::consts::LN_2, BoundKind::Capacity)),
         Criterion::MeanSquaredError if model.prior().is_normal() => {
-            let prior = model.prior_variance();
-            let left = 1.0 / (1.0 / prior + model.noise().precision_of_mean());
-            found.push((left + (prior - left) * (-2.0 * total).exp2(), BoundKind::Together));
+            let together = bounds::remote_distortion_rate(model.prior(), model.noise(), total)?;
+            found.push((together, BoundKind::Together));
             // No CEO bound for correlated noise, too many sensors, or if it does not converge.
             let ceo = bounds::ceo(model.prior(), model.noise(), &capacities);
             found.extend(ceo.ok().map(|bound| (bound.lower(), BoundKind::Ceo)));

@@ -94,7 +94,7 @@ proptest! {
             for criterion in [Criterion::MutualInformation, Criterion::MeanSquaredError] {
                 if let Ok(found) = design::joint(&system, criterion, &Newton::default()) {
                     prop_assert!(found.value.is_finite(), "{:?}: {:?}", system, found.value);
-                    prop_assert!(found.quantizers().iter().flat_map(|q| q.breakpoints().to_vec()).all(|b| b.is_finite()));
+                    prop_assert!(found.system.quantizers().iter().flat_map(|q| q.breakpoints().to_vec()).all(|b| b.is_finite()));
                 }
             }
         }
