@@ -215,7 +215,9 @@ fn nine_sensors_in_different_groups_return_to_one_quantizer() {
                 }
             };
             let groups = sizes.iter().enumerate().map(group).collect();
-            let end = joint(&System::new(sensors(9), groups).unwrap(), criterion).system.quantizers();
+            let end = joint(&System::new(sensors(9), groups).unwrap(), criterion)
+                .system
+                .quantizers();
             assert!(end.iter().all(|q| apart(q, &end[0]) <= 1e-6), "{levels} levels, {sizes:?}, {criterion:?}");
         }
     }

@@ -321,7 +321,9 @@ mod tests {
         assert!(CodedSensors::with_variances(1.0, &[0.1, 0.0]).is_err());
         let sensors = CodedSensors::with_variances(1.0, &[0.1, 0.2]).unwrap();
         for bad in [vec![0], vec![0, 0], vec![0, 2]] {
-            assert!(matches!(sensors.mse(&bad, Estimator::CellCentre), Err(Error::Argument(e)) if e.name == "assignment"));
+            assert!(
+                matches!(sensors.mse(&bad, Estimator::CellCentre), Err(Error::Argument(e)) if e.name == "assignment")
+            );
             assert!(sensors.mse(&bad, Estimator::PosteriorMean).is_err());
         }
     }

@@ -18,7 +18,11 @@ impl Bank {
     }
 
     /// `E[(x - estimate)^2 | observations]`: at the posterior mean the posterior variance.
-    pub(crate) fn posterior_squared_error(&self, observations: &[Observation<bool>], estimate: f64) -> Result<f64, Error> {
+    pub(crate) fn posterior_squared_error(
+        &self,
+        observations: &[Observation<bool>],
+        estimate: f64,
+    ) -> Result<f64, Error> {
         let (score, nodes) = self.posterior_score(observations)?;
         let w = weights_under(&score, &nodes);
         let (mass, _) = moments(&w, &nodes.x);

@@ -5,14 +5,13 @@
 
 use fewbits_baselines::dymbo::first_message::{first_message_mse, first_message_value};
 use fewbits_baselines::dymbo::{
-    SignFilter, contours, iterated, scalar_fixed_lag_variance, skew_normal, steady_state, tree,
+    SignFilter, chain, contours, iterated, scalar_fixed_lag_variance, skew_normal, steady_state, tree,
 };
 use fewbits_core::factor::{Factor, Levels};
 use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
-use fewbits_dymbo::chain::{self, TransientStep};
 use fewbits_dymbo::{
     CountFusion, DymboFilter, MultibitFilter, Multiple, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant,
-    filtered_variance, sign_bit, steady,
+    filtered_variance, sign_bit,
 };
 use fewbits_filters::{PointMass, TransitionKernel, UniformGrid, assumed_density, kalman};
 use fewbits_models::{LinearGaussian, LinearSensor, ScalarSensor};
@@ -276,7 +275,7 @@ fn fig5_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
         return Some(variances);
     }
     let transient = chain::first_message_transient(&plant, entry.number("tau"), entry.number("M00"), steps).unwrap();
-    let pick = |step: &TransientStep| {
+    let pick = |step: &chain::TransientStep| {
         if entry.ends(".M") {
             step.filtered_variance
         } else {
@@ -301,7 +300,7 @@ fn prop2_entry(entry: &Entry<'_>) -> Vec<f64> {
 fn sensors_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
     let (plant, k) = (entry.plant(), entry.number("K") as usize);
     Some(match entry.id.rsplit('.').next()? {
-        "seq" => vec![steady::sequential_steady_state(&plant, k).unwrap().filtered_variance],
+        "seq" => vec![chain::sequential_steady_state(&plant, k).unwrap().filtered_variance],
         "par" => {
             let (mse, riccati) =
                 chain::parallel_mse(&ParallelFilter::new(plant, k, CountFusion::Linear).unwrap()).unwrap();

@@ -5,8 +5,8 @@ use fewbits_quantizer_design::decoder::MmseDecoder;
 use fewbits_quantizer_design::design;
 use fewbits_quantizer_design::system::SensorGroup;
 use fewbits_quantizer_design::{
-    Certificate, Channel, Criterion, Error, JointTable, Labelling, Newton, Noise, ObservationModel, Prior, Quantizer, System,
-    bounds, lloyd_max,
+    Certificate, Channel, Criterion, Error, JointTable, Labelling, Newton, Noise, ObservationModel, Prior, Quantizer,
+    System, bounds, lloyd_max,
 };
 use proptest::prelude::*;
 

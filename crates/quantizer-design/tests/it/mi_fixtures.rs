@@ -4,8 +4,8 @@ use fewbits_baselines::quantizer_design::{self as baselines, Separation};
 use fewbits_quantizer_design::design::{self, Design};
 use fewbits_quantizer_design::table::JointTable;
 use fewbits_quantizer_design::{
-    Certificate, Channel, Criterion, Labelling, Newton, Noise, ObservationModel, Prior, Quantizer, System, bounds, canonical,
-    lloyd_max,
+    Certificate, Channel, Criterion, Labelling, Newton, Noise, ObservationModel, Prior, Quantizer, System, bounds,
+    canonical, lloyd_max,
 };
 use serde_json::Value;
 use std::collections::BTreeSet;
