@@ -157,7 +157,7 @@ fn no_design_beats_a_bound() {
         let bits = (levels as f64).log2() * (1.0 - flips);
         let bound = bounds::ceo(model.prior(), model.noise(), &vec![bits; model.sensors()]).unwrap();
         let words = Labelling::natural(levels).unwrap();
-        let channel = Channel::binary_symmetric_with_gaps(&words, crossover).unwrap();
+        let channel = Channel::binary_symmetric(&words, crossover).unwrap();
         let start = lloyd(levels, model.sample_deviation(0));
         let group = SensorGroup {
             quantizer: start,

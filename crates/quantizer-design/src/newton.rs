@@ -90,14 +90,6 @@ impl Newton {
         positive("max_step", self.max_step)?;
         Ok(())
     }
-
-    /// Settings that stop at the stationary point to which the start leads, even if it is a saddle.
-    pub fn to_nearest_stationary_point() -> Self {
-        Self {
-            at_saddle: AtSaddle::Stay,
-            ..Self::default()
-        }
-    }
 }
 
 /// A value with its first and second derivatives.

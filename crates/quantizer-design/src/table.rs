@@ -135,7 +135,7 @@ impl JointTable {
     /// # Errors
     /// If the prior is continuous.
     pub fn equivocation(&self) -> Result<f64, Error> {
-        if !self.model().prior().is_discrete() {
+        if self.model().prior().points().is_none() {
             return refuse("prior", "a continuous prior", "a discrete prior for a conditional entropy");
         }
         let outcomes = self.likelihood.chunks_exact(self.values().len());

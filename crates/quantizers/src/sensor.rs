@@ -68,11 +68,6 @@ impl QuantizingSensor {
         })
     }
 
-    /// The quantizer.
-    pub fn quantizer(&self) -> &Quantizer {
-        &self.quantizer
-    }
-
     /// The words of the levels, which are the format of the reports.
     pub fn labelling(&self) -> &Labelling {
         &self.labelling

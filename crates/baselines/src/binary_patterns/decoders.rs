@@ -97,7 +97,9 @@ fn division_map(bank: &Bank, grid: &Quantizer, scaled: impl Fn(f64, f64) -> f64)
     let tables = bank.groups().map(|(sensor, count)| {
         let bit = |bit: usize, cell: &Cell| {
             let pairs = cell.nodes.x.iter().zip(&cell.nodes.w);
-            let joint: f64 = pairs.map(|(&x, &w)| w * sensor.probabilities(x)[bit]).sum();
+            let joint: f64 = pairs
+                .map(|(&x, &w)| w * sensor.quantizer().probabilities(x, sensor.noise_deviation())[bit])
+                .sum();
             log(scaled(joint, cell.mass))
         };
         let rows = [0, 1].map(|b| cells.iter().map(|cell| bit(b, cell)).collect::<Vec<_>>());

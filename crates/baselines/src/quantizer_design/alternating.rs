@@ -126,7 +126,7 @@ pub fn alternating_step(system: &System, group: usize, criterion: Criterion) -> 
 
     let model = system.model();
     let spread = model.sample_deviation(entry.sensors[0]);
-    let start = model.sample_mean() - REACH * spread;
+    let start = model.prior().mean() - REACH * spread;
     let step = 2.0 * REACH * spread / SCAN as f64;
     let (mut labels, mut breakpoints) = (vec![worth.best(start)], Vec::new());
     for i in 1..=SCAN {

@@ -140,7 +140,7 @@ impl Objective for Separated<'_> {
     }
 
     fn blocks(&self) -> Vec<usize> {
-        vec![self.sensor.parameters()]
+        vec![self.sensor.exchange.len()]
     }
 
     fn unit(&self, value: f64) -> f64 {

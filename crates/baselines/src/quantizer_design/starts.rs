@@ -48,7 +48,7 @@ pub fn random_starts(system: &System, starts: usize, seed: u64) -> Vec<System> {
 /// The system with random ordered breakpoints.
 fn random_system(system: &System, stream: Stream) -> Result<System, Error> {
     let mut rng = stream.rng();
-    let mean = system.model().sample_mean();
+    let mean = system.model().prior().mean();
     let quantizers = system
         .groups()
         .iter()

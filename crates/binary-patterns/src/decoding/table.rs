@@ -106,7 +106,7 @@ mod tests {
                     .map(|i| {
                         let x = -1.0 + 2.0 * f64::from(i) / f64::from(steps);
                         let end = if i == 0 || i == steps { 0.5 } else { 1.0 };
-                        let given = |n: usize| bank.sensor(n).probabilities(x)[usize::from(bits[n])];
+                        let given = |n: usize| bank.sensor(n).quantizer().probabilities(x, 0.2)[usize::from(bits[n])];
                         end * given(0) * given(1) * given(2) / f64::from(steps)
                     })
                     .sum();

@@ -34,11 +34,6 @@ impl PatternSensor {
         self.noise_deviation
     }
 
-    /// `[P(0|x), P(1|x)]`.
-    pub fn probabilities(&self, x: f64) -> [f64; 2] {
-        self.quantizer.probabilities(x, self.noise_deviation)
-    }
-
     /// `[ln P(0|x), ln P(1|x)]`.
     pub fn log_probabilities(&self, x: f64) -> [f64; 2] {
         self.quantizer.log_probabilities(x, self.noise_deviation)

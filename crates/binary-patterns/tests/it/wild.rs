@@ -34,7 +34,7 @@ proptest! {
         for quantizer in [BinaryQuantizer::new(x[..count].to_vec()), BinaryQuantizer::new(sorted)].into_iter().flatten() {
             let _ = quantizer.encode(x[5]);
             let Ok(sensor) = PatternSensor::with_deviation(quantizer, x[6]) else { continue };
-            let p = sensor.probabilities(x[7]);
+            let p = sensor.quantizer().probabilities(x[7], x[6]);
             prop_assert!(!x[7].is_finite() || (p[0] + p[1] - 1.0).abs() < 1e-9, "{:?} {}: {:?}", sensor, x[7], p);
             prop_assert!(!x[7].is_finite() || !sensor.quantizer().fisher_information(x[7], x[6]).is_nan(), "{:?} {}", sensor, x[7]);
             let link = Link::new(x[0], x[1]).unwrap_or(Link::PERFECT);

@@ -60,7 +60,7 @@ impl Objective for Problem<'_> {
 
     /// Numbers of breakpoints of the active groups.
     fn blocks(&self) -> Vec<usize> {
-        self.active.iter().map(Active::parameters).collect()
+        self.active.iter().map(|a| a.exchange.len()).collect()
     }
 
     fn unit(&self, value: f64) -> f64 {

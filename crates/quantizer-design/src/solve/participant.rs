@@ -6,7 +6,7 @@ use crate::observation_model::ObservationModel;
 use crate::system::{SensorGroup, System};
 use fewbits_core::Link;
 use fewbits_numerics::error::entries;
-use fewbits_quantizers::quantizer::{cell_of, check_increasing};
+use fewbits_quantizers::quantizer::check_increasing;
 use fewbits_quantizers::{Channel, Quantizer, lloyd_max};
 use serde::{Deserialize, Serialize};
 
@@ -27,14 +27,6 @@ pub struct SensorDesign {
 }
 
 impl SensorDesign {
-    /// The word for a sample.
-    ///
-    /// # Errors
-    /// If the sample is NaN.
-    pub fn encode(&self, sample: f64) -> Result<usize, Error> {
-        Ok(self.words[cell_of(&self.breakpoints, sample)?])
-    }
-
     /// Number of symbols that can be received: all words, and one more after them, "nothing", if a word may be missing.
     pub fn symbols(&self) -> usize {
         (1 << self.bits) + usize::from(missing(&self.link) > 0.0)
@@ -139,7 +131,7 @@ pub(super) fn plain(
 ) -> Result<Vec<WordedCells>, Error> {
     let of = |(n, participant): (usize, &SensorDesign)| {
         let levels = 1usize << participant.bits;
-        let lloyd = lloyd_max::gaussian(levels)?.affine(model.sample_mean(), model.sample_deviation(n))?;
+        let lloyd = lloyd_max::gaussian(levels)?.affine(model.prior().mean(), model.sample_deviation(n))?;
         Ok(WordedCells {
             breakpoints: lloyd.breakpoints().to_vec(),
             words: (0..levels).map(word).collect(),
@@ -204,7 +196,7 @@ fn parts_of(model: &ObservationModel, law: &Channel, cells: &WordedCells) -> Res
     // A quantizer has at least two cells: a sensor with one cell gets two with the same word.
     if used.len() == 1 {
         used.push(used[0]);
-        (labels, breakpoints) = (vec![0, 1], vec![model.sample_mean()]);
+        (labels, breakpoints) = (vec![0, 1], vec![model.prior().mean()]);
     }
     let rows = (0..law.outputs()).map(|t| used.iter().map(|w| law.probability(t, *w)).collect());
     let rows: Vec<Vec<f64>> = rows.collect();

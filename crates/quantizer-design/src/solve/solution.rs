@@ -12,6 +12,7 @@ use crate::observation_model::ObservationModel;
 use crate::system::System;
 use fewbits_core::Link;
 use fewbits_numerics::error::entries;
+use fewbits_quantizers::quantizer::cell_of;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
@@ -162,7 +163,7 @@ impl Solution {
     pub fn gap(&self) -> Option<f64> {
         let bound = self.bound?.value;
         let unit = match self.criterion {
-            Criterion::MeanSquaredError => self.system.model().prior_variance(),
+            Criterion::MeanSquaredError => self.system.model().prior().deviation().powi(2),
             Criterion::MutualInformation | Criterion::BayesError => 1.0,
         };
         let apart = (self.value - bound).abs();
@@ -181,7 +182,7 @@ impl Solution {
         self.sensors
             .iter()
             .zip(samples)
-            .map(|(sensor, y)| sensor.encode(*y))
+            .map(|(sensor, y)| Ok(sensor.words[cell_of(&sensor.breakpoints, *y)?]))
             .collect()
     }
 
@@ -279,7 +280,10 @@ fn tightest_bound(system: &System, sensors: &[SensorDesign], criterion: Criterio
             found.push((together, BoundKind::Together));
             // No CEO bound for correlated noise, too many sensors, or if it does not converge.
             let ceo = bounds::ceo(model.prior(), model.noise(), &capacities);
-            found.extend(ceo.ok().map(|bound| (bound.lower(), BoundKind::Ceo)));
+            found.extend(
+                ceo.ok()
+                    .map(|bound| (bound.distortion * (-bound.gap).exp(), BoundKind::Ceo)),
+            );
         }
         _ => {}
     }

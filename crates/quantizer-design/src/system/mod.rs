@@ -141,7 +141,7 @@ impl System {
     pub fn lloyd_max(model: ObservationModel, levels: usize) -> Result<Self, Error> {
         let standard = lloyd_max::gaussian(levels)?;
         let quantizers = (0..model.sensors())
-            .map(|n| Ok(Quantizer::from(&standard.affine(model.sample_mean(), model.sample_deviation(n))?)))
+            .map(|n| Ok(Quantizer::from(&standard.affine(model.prior().mean(), model.sample_deviation(n))?)))
             .collect::<Result<Vec<_>, Error>>()?;
         Self::ideal(model, quantizers)
     }

@@ -5,8 +5,8 @@ use fewbits_core::Link;
 use fewbits_quantizer_design::decoder::MmseDecoder;
 use fewbits_quantizer_design::design::{self, Design, Scope};
 use fewbits_quantizer_design::{
-    AllowedCells, BitBudget, Certificate, Channel, Criterion, JointTable, Newton, Noise, ObservationModel, Prior,
-    Quantizer, Request, System, lloyd_max,
+    AllowedCells, AtSaddle, BitBudget, Certificate, Channel, Criterion, JointTable, Newton, Noise, ObservationModel,
+    Prior, Quantizer, Request, System, lloyd_max,
 };
 
 const MI: Criterion = Criterion::MutualInformation;
@@ -81,7 +81,10 @@ fn saddles_are_left_in_every_unit() {
             assert_eq!(other.certificate, Certificate::LocalOptimum);
         }
     }
-    let stay = Newton::to_nearest_stationary_point();
+    let stay = Newton {
+        at_saddle: AtSaddle::Stay,
+        ..Newton::default()
+    };
     for scale in SCALES {
         let start = System::lloyd_max(equal_pair(0.85, scale), 4).unwrap();
         assert!(design::joint(&start, MSE, &stay).unwrap().certificate == Certificate::Saddle, "{scale}");
@@ -238,7 +241,15 @@ fn identical_sensors_leave_the_saddle_of_equal_quantizers() {
         let found = design::joint(&shared(scale), MI, &Newton::default()).unwrap();
         assert!((found.value - 0.331_123_01).abs() < 1e-8, "{}", found.value);
         assert_eq!((found.certificate, found.scope), (Certificate::LocalOptimum, Scope::EverySensor));
-        let stay = design::joint(&shared(scale), MSE, &Newton::to_nearest_stationary_point()).unwrap();
+        let stay = design::joint(
+            &shared(scale),
+            MSE,
+            &Newton {
+                at_saddle: AtSaddle::Stay,
+                ..Newton::default()
+            },
+        )
+        .unwrap();
         assert!(stay.certificate == Certificate::Saddle);
     }
     // Independent noise: equal quantizers are an optimum, also over the breakpoints of every sensor.
