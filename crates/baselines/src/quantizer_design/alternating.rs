@@ -76,7 +76,13 @@ pub fn alternate(system: &System, group: usize, criterion: Criterion, rule: &Alt
     for iteration in 1..=rule.max_iterations {
         let old = single_sensor(&current, group)?.quantizer.clone();
         let quantizer = alternating_step(&current, group, criterion)?;
-        if rule.cells == AllowedCells::Intervals && !quantizer.is_contiguous() {
+        if rule.cells == AllowedCells::Intervals
+            && quantizer
+                .labels()
+                .iter()
+                .enumerate()
+                .any(|(cell, level)| cell != *level)
+        {
             return Err(Error::NotContiguous {
                 labels: quantizer.labels().to_vec(),
             });
