@@ -276,8 +276,8 @@ fn tightest_bound(system: &System, sensors: &[SensorDesign], criterion: Criterio
     match criterion {
         Criterion::MutualInformation => found.push((total * std::f64::consts::LN_2, BoundKind::Capacity)),
         Criterion::MeanSquaredError if model.prior().is_normal() => {
-            let together = bounds::remote_distortion_rate(model.prior(), model.noise(), total)?;
-            found.push((together, BoundKind::Together));
+            let together = bounds::remote_distortion_rate(model.prior(), model.noise(), total);
+            found.extend(together.ok().map(|bound| (bound, BoundKind::Together)));
             // No CEO bound for correlated noise, too many sensors, or if it does not converge.
             let ceo = bounds::ceo(model.prior(), model.noise(), &capacities);
             found.extend(
