@@ -72,3 +72,13 @@ pub enum Error {
         step: f64,
     },
 }
+
+impl Error {
+    /// The refused argument, if that is the error.
+    pub fn argument(&self) -> Option<&ArgumentError> {
+        match self {
+            Self::Argument(argument) => Some(argument),
+            _ => None,
+        }
+    }
+}

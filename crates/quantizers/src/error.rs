@@ -73,6 +73,14 @@ pub enum Error {
 }
 
 impl Error {
+    /// The refused argument, if that is the error.
+    pub fn argument(&self) -> Option<&ArgumentError> {
+        match self {
+            Self::Argument(argument) => Some(argument),
+            _ => None,
+        }
+    }
+
     /// Refuses a table of more than `limit` entries.
     ///
     /// # Errors
