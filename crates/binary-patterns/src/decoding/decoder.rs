@@ -1,5 +1,6 @@
 //! The posterior mean given the bits of a bank, its table over all outcomes, and exact errors.
 
+use super::sums::{moments, squared_error};
 use crate::observation::bank::Bank;
 use crate::observation::source::Nodes;
 use crate::{Error, LookupTable, PatternSensor};
@@ -107,18 +108,6 @@ impl Bank {
         let tables: Vec<Table> = self.groups().map(of).collect();
         for_each_log(&tables, &vec![0.0; points.len()], visit);
     }
-}
-
-/// `(sum w, sum w x)`.
-pub fn moments(w: &[f64], x: &[f64]) -> (f64, f64) {
-    w.iter()
-        .zip(x)
-        .fold((0.0, 0.0), |(m0, m1), (w, x)| (m0 + w, m1 + w * x))
-}
-
-/// `sum w (x - estimate)^2`.
-pub fn squared_error(w: &[f64], x: &[f64], estimate: f64) -> f64 {
-    w.iter().zip(x).map(|(w, x)| w * (x - estimate) * (x - estimate)).sum()
 }
 
 /// Mean of the source if its density is multiplied by the exponential of `score`, which is given at the nodes.

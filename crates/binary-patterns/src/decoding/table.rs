@@ -1,6 +1,6 @@
 //! Estimates for every outcome of a bank, as a table.
 
-use super::decoder::squared_error;
+use super::sums::squared_error;
 use crate::{Bank, Error};
 use fewbits_core::Observation;
 use fewbits_numerics::error::{all_finite, entries};

@@ -1,6 +1,6 @@
 //! Search through the tree of all multisets of masks.
 
-use super::{LinearSearch, MaskSet};
+use super::setting::{LinearSearch, MaskSet};
 use crate::patterns::linear::Span;
 use crate::search::outcomes::{Candidates, Outcomes};
 use crate::{BinaryQuantizer, Error, Mask, linear_pattern};
