@@ -228,8 +228,8 @@ fn unequal() -> CodedSensors {
 fn posterior_mean_and_exchanges_lower_the_error_of_table_6_1() {
     let sensors = unequal();
     let linear = pair_costs(&sensors).solve();
-    let mean = sensors.mmse(&linear).unwrap();
-    assert!(mean < sensors.centre_mse(&linear).unwrap());
+    let mean = sensors.mse(&linear, Estimator::PosteriorMean).unwrap();
+    assert!(mean < sensors.mse(&linear, Estimator::CellCentre).unwrap());
     agree("binary-beyond", "after", "assign-mmse", |_| mean);
     let exchanged = exchange(&sensors, &linear, Estimator::PosteriorMean).unwrap().error;
     assert!(exchanged < mean);

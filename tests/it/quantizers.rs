@@ -157,7 +157,7 @@ fn no_design_beats_a_bound() {
         let bits = (levels as f64).log2() * (1.0 - flips);
         let bound = bounds::ceo(model.prior(), model.noise(), &vec![bits; model.sensors()]).unwrap();
         let words = Labelling::natural(levels).unwrap();
-        let channel = Channel::binary_symmetric_with_gaps(&words, crossover).unwrap();
+        let channel = Channel::binary_symmetric(&words, crossover).unwrap();
         let start = lloyd(levels, model.sample_deviation(0));
         let group = SensorGroup {
             quantizer: start,
@@ -186,7 +186,7 @@ fn iterations_of_newton_and_of_alternating_maximisation() {
     // The last iteration only confirms that the step vanished.
     agree("mi-beyond", "newton", "", |row| newton(row).iterations as f64 - 1.0);
     agree("mi-beyond", "alternating", "", |row| {
-        let limit = newton(row).quantizers();
+        let limit = newton(row).system.quantizers();
         let (mut current, mut steps) = (start(row), 0);
         while apart(&current.quantizers()[0], &limit[0]) > 1e-8 && steps < 1000 {
             let quantizer = baselines::alternating_step(&current, 0, MI).unwrap();
@@ -215,7 +215,9 @@ fn nine_sensors_in_different_groups_return_to_one_quantizer() {
                 }
             };
             let groups = sizes.iter().enumerate().map(group).collect();
-            let end = joint(&System::new(sensors(9), groups).unwrap(), criterion).quantizers();
+            let end = joint(&System::new(sensors(9), groups).unwrap(), criterion)
+                .system
+                .quantizers();
             assert!(end.iter().all(|q| apart(q, &end[0]) <= 1e-6), "{levels} levels, {sizes:?}, {criterion:?}");
         }
     }

@@ -5,11 +5,11 @@
 //!
 //! | module | compares |
 //! |---|---|
-//! | [`binary_patterns`] | other ways to send one bit per sensor, and substitutes for a search |
+//! | [`binary_patterns`] | other ways to send one bit per sensor, bounds of all of them, and substitutes for a search |
 //! | [`bussgang`] | signs of several sensors, by the linear estimator |
-//! | [`cfwmd`] | silence ignored, a random trigger, and withheld measurements imputed |
+//! | [`cfwmd`] | silence ignored, a random trigger, and withheld measurements imputed; the information of a message or of silence |
 //! | [`diffusive`] | polynomial Gaussians, particles and Laplace as messages; Tierney and Kadane's ratios, and cumulants |
-//! | [`dymbo`] | how normal the posterior of one bit is; successive bits of one sample |
+//! | [`dymbo`] | the exact error of every scalar filter; how normal the posterior of one bit is; successive bits of one sample |
 //! | [`handoff`] | bounds of the error after several hand-overs |
 //! | [`mixture_codec`] | the paper's reductions |
 //! | [`over_bits`] | published estimators of identical sensors, slot by slot, as receivers of `fewbits-protocol` |

@@ -42,7 +42,7 @@ pub mod search;
 
 pub use decoding::table::LookupTable;
 pub use fewbits_quantizers::Error;
-pub use observation::bank::{Bank, IMPOSSIBLE};
+pub use observation::bank::Bank;
 pub use observation::sensor::PatternSensor;
 pub use observation::source::{Nodes, Source, Threshold};
 pub use patterns::grid::uniform_cells;

@@ -14,7 +14,6 @@
 //! | the same without a centre: the likelihoods of an instant | [`Network::likelihoods`](network::Network::likelihoods) |
 //! | fusion without feedback | [`no_feedback`] |
 //! | thresholds before deployment | [`expected_covariances`](schedule::expected_covariances) |
-//! | information of a message or of silence | [`information`] |
 //!
 //! **The likelihood of silence is computed in closed form or by quadrature, never by sampling.** With linear sensors
 //! the belief is the Gaussian with the exact mean and covariance after each observation
@@ -58,7 +57,6 @@
 
 pub mod censored;
 pub mod ellipsoid;
-pub mod information;
 mod missing;
 pub mod network;
 pub mod no_feedback;

@@ -128,11 +128,6 @@ impl Room {
         })
     }
 
-    /// Numbers of cells along x, y and z.
-    pub fn counts(&self) -> [usize; 3] {
-        self.counts
-    }
-
     /// A place of the file in the coordinates of the domain, which begin at the lowest corner, m.
     pub fn place(&self, point: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|axis| point[axis] - self.corner[axis])

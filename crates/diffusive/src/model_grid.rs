@@ -25,6 +25,16 @@ pub struct ModelGrid {
     weights: Vec<f64>,
 }
 
+/// One model alone.
+impl From<SourceSensor> for ModelGrid {
+    fn from(sensor: SourceSensor) -> Self {
+        Self {
+            sensors: vec![sensor],
+            weights: vec![1.0],
+        }
+    }
+}
+
 impl ModelGrid {
     /// The models with the prior probabilities `weights`. The sensors may differ in the model of the medium and what follows from it, but
     /// they are the same sensors: their instants, noise and bias are equal.
@@ -56,14 +66,6 @@ impl ModelGrid {
     pub fn uniform(sensors: Vec<SourceSensor>) -> Result<Self, Error> {
         let weights = vec![(sensors.len().max(1) as f64).recip(); sensors.len()];
         Self::new(sensors, &weights)
-    }
-
-    /// One model alone.
-    pub fn single(sensor: SourceSensor) -> Self {
-        Self {
-            sensors: vec![sensor],
-            weights: vec![1.0],
-        }
     }
 
     /// Number of models.

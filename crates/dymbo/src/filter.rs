@@ -5,7 +5,6 @@ use crate::sign_bit::{self, SignBit};
 use crate::{Error, ScalarPlant};
 use fewbits_core::factor::Scalar;
 use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
-use fewbits_numerics::error::finite;
 use fewbits_numerics::normal::SQRT_2_OVER_PI;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -149,14 +148,6 @@ impl DymboFilter {
     #[inline]
     pub fn threshold(&self, belief: &Gaussian<1>) -> f64 {
         self.plant.coefficient() * belief.mean()[0]
-    }
-
-    /// Size of the correction at the steady variance, if every bit arrives. At `a = 1` over a link that inverts no bit it is `sigma_u`.
-    ///
-    /// # Errors
-    /// If the variance has no finite steady state, or the correction overflows.
-    pub fn steady_step(&self) -> Result<f64, Error> {
-        Ok(finite("steady step", self.gain(self.plant.steady_state(self.information())?.predicted_variance))?)
     }
 
     #[inline]
@@ -330,7 +321,9 @@ mod tests {
         assert_eq!(DymboFilter::new(plant).step(&huge, &above), Err(Error::Impossible));
         // At a = 1 the steady step is sigma_u.
         let walk = DymboFilter::new(ScalarPlant::new(1.0, 0.49, 1.7).unwrap());
-        assert!((walk.steady_step().unwrap() - 0.7).abs() < 1e-14);
+        let steady = walk.plant().steady_state(walk.information()).unwrap().filtered_variance;
+        let (_, info) = walk.step(&Gaussian::scalar(0.0, steady).unwrap(), &above).unwrap();
+        assert!((info.correction - 0.7).abs() < 1e-14);
     }
 
     #[test]

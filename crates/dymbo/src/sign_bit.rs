@@ -5,7 +5,6 @@ use fewbits_core::factor::{Constant, Levels, Scalar};
 use fewbits_core::rand::Rng;
 use fewbits_core::{Deterministic, Link, MeasurementNoise, NumberFormat, Observation, Scheme, Sign};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
-use fewbits_numerics::normal;
 use nalgebra::{Matrix1, Vector1};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_2_PI;
@@ -13,7 +12,7 @@ use std::f64::consts::FRAC_2_PI;
 /// A sensor that reports whether its sample is at or above the broadcast threshold.
 ///
 /// Any threshold is allowed. The Dymbo filter broadcasts the prediction `a theta_hat(n-1)` of the present state, the best threshold for
-/// a single step ([`expected_information`]). Equation (14) of the paper prints `theta_hat(n-1)` (erratum `dymbo-1`).
+/// a single step. Equation (14) of the paper prints `theta_hat(n-1)` (erratum `dymbo-1`).
 ///
 /// ```
 /// use fewbits_core::{Factor, Gaussian, Link, Observation, Scheme, Sign};
@@ -117,42 +116,10 @@ pub fn information(link: &Link) -> f64 {
     FRAC_2_PI * clean * clean
 }
 
-/// The information averaged over both bits if the threshold is `z = offset` innovation standard deviations from the prediction:
-/// `(1 - 2 eps)^2 phi(z)^2/(p_+ p_-)`, `p_+` and `p_-` the probabilities of the bits. It is largest at `offset = 0`.
-///
-/// # Errors
-/// If the offset is not finite.
-pub fn expected_information(offset: f64, link: &Link) -> Result<f64, ArgumentError> {
-    let (z, eps) = (finite("offset", offset)?, link.crossover());
-    if eps == 0.0 {
-        return Ok(normal::inverse_mills(z) * normal::inverse_mills(-z));
-    }
-    let clean = 1.0 - 2.0 * eps;
-    let received = |z: f64| eps + clean * normal::cdf(z);
-    let slope = clean * normal::pdf(z);
-    Ok(slope * slope / (received(z) * received(-z)))
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{SignBit, expected_information};
+    use super::SignBit;
     use fewbits_core::{Factor, Gaussian, Link, Observation, Scheme, Sign};
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn the_two_bits_average_to_the_expected_information(z in -3.0..3.0_f64, eps in 0.0..0.5_f64) {
-            let (prior, link) = (Gaussian::scalar(0.0, 3.0).unwrap(), Link::flipping(eps).unwrap());
-            let mean: f64 = [Sign::Above, Sign::Below]
-                .into_iter()
-                .map(|bit| SignBit::new(1.0).unwrap().factor(&(2.0 * z), &Observation::Received(bit), &link).unwrap())
-                .map(|factor| factor.tilted(&prior).unwrap())
-                // P - c P^2/(P + r) with P = 3, r = 1.
-                .map(|after| after.log_evidence.exp() * (3.0 - after.covariance[0]) * 4.0 / 9.0)
-                .sum();
-            prop_assert!((mean - expected_information(z, &link).unwrap()).abs() < 1e-12);
-        }
-    }
 
     #[test]
     fn far_thresholds_keep_their_digits() {
@@ -168,7 +135,7 @@ mod tests {
 
     #[test]
     fn refuses_what_is_no_number() {
-        assert!(SignBit::new(0.0).is_err() && expected_information(f64::NAN, &Link::PERFECT).is_err());
+        assert!(SignBit::new(0.0).is_err());
         assert_eq!(SignBit::new(1.7).unwrap().noise_variance, 1.7);
         let scheme = SignBit::new(1.0).unwrap();
         for observation in [

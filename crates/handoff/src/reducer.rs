@@ -55,11 +55,6 @@ impl<const D: usize> Handover<D> {
     pub fn message(&self) -> Option<&BitString> {
         self.message.as_ref()
     }
-
-    /// Length of the message in bits; `None` if the mixture is handed over as real numbers.
-    pub fn bits(&self) -> Option<usize> {
-        self.message.as_ref().map(BitString::bits)
-    }
 }
 
 /// A method that makes a belief small enough to be sent.

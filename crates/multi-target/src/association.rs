@@ -4,7 +4,7 @@ use fewbits_core::Error;
 use fewbits_numerics::error::{entries, refuse};
 
 /// Most tracks, or reports, of one cluster; the other side may have any number.
-pub const LARGEST: usize = 14;
+const LARGEST: usize = 14;
 
 /// Logarithms of the weights of an association. A joint association has the product of the weights of its pairs, of `missed` for each track
 /// without a report, and of `unassigned` for each report without a track. `-inf` excludes.
@@ -53,7 +53,7 @@ fn log_add(a: f64, b: f64) -> f64 {
 /// ```
 ///
 /// # Errors
-/// If lengths differ, a weight is NaN or infinite, or a cluster has more than [`LARGEST`] tracks and as many reports;
+/// If lengths differ, a weight is NaN or infinite, or a cluster has more than 14 tracks and as many reports;
 /// [`Error::Impossible`] if every joint association has weight zero.
 pub fn marginals(weights: &Weights) -> Result<Marginals, Error> {
     let (tracks, reports) = (weights.missed.len(), weights.unassigned.len());

@@ -45,7 +45,7 @@ mod gospa;
 mod tracker;
 
 pub use assignment::assign;
-pub use association::{LARGEST, Marginals, Weights, marginals};
+pub use association::{Marginals, Weights, marginals};
 pub use fewbits_core::Error;
 pub use gospa::{Gospa, gospa};
 pub use tracker::{Birth, Label, Report, Track, Tracker, Tracks};

@@ -40,11 +40,6 @@ impl<const D: usize> Tracks<D> {
     pub fn confirmed(&self, threshold: f64) -> impl Iterator<Item = &Track<D>> {
         self.list.iter().filter(move |track| track.existence > threshold)
     }
-
-    /// Expected number of targets.
-    pub fn expected(&self) -> f64 {
-        self.list.iter().map(|track| track.existence).sum()
-    }
 }
 
 /// Where targets appear.

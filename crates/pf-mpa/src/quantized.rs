@@ -113,12 +113,6 @@ impl QuantizedRange {
         })
     }
 
-    /// The same sensor with other code words, such as a Gray code.
-    #[must_use]
-    pub fn with_labelling(self, labelling: Labelling) -> Self {
-        Self { labelling, ..self }
-    }
-
     /// Number of levels `L`.
     pub fn levels(&self) -> usize {
         self.labelling.levels()

@@ -74,13 +74,13 @@ enum Kind {
 impl Scored {
     pub(crate) fn new(criterion: Criterion, model: &ObservationModel) -> Result<Self, Error> {
         let (kind, features) = match criterion {
-            Criterion::MutualInformation if model.prior().is_discrete() && model.values.len() <= FEW_VALUES => {
+            Criterion::MutualInformation if model.prior().points().is_some() && model.values.len() <= FEW_VALUES => {
                 (Kind::Equivocation, model.given.clone())
             }
             Criterion::MutualInformation if model.noise().is_independent() => (Kind::Entropy, vec![model.mass.clone()]),
             Criterion::MutualInformation => (Kind::Information, model.given.clone()),
             Criterion::MeanSquaredError => (Kind::Explained, vec![model.mass.clone(), model.moment.clone()]),
-            Criterion::BayesError if model.prior().is_discrete() => (Kind::Decision, model.given.clone()),
+            Criterion::BayesError if model.prior().points().is_some() => (Kind::Decision, model.given.clone()),
             Criterion::BayesError => {
                 return refuse("prior", "a continuous prior", "a discrete prior for a Bayes error");
             }

@@ -9,10 +9,9 @@ use crate::table::Layout;
 use fewbits_core::Observation;
 use fewbits_numerics::error::entries;
 use fewbits_quantizers::Symbol;
-use serde::{Deserialize, Serialize};
 
 /// Posterior mean and variance of the unknown.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// `E[X | T = t]`, the estimate of least mean squared error.
     pub mean: f64,
@@ -38,35 +37,14 @@ pub struct Estimate {
 /// assert!(decoder.decode(&observations)?.variance > estimate.variance);
 /// # Ok::<(), fewbits_quantizer_design::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredDecoder")]
+#[derive(Debug, Clone, PartialEq)]
 pub struct MmseDecoder {
     system: System,
-    limit: usize,
-    #[serde(skip_serializing)]
     layout: Layout,
     /// Probability, mean and variance of each outcome.
-    #[serde(skip_serializing)]
     entries: Vec<[f64; 3]>,
     /// Symbol probabilities at the nodes, for one sensor of each group.
-    #[serde(skip_serializing)]
     symbols: Vec<Table>,
-}
-
-/// The stored form of [`MmseDecoder`].
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredDecoder {
-    system: System,
-    limit: usize,
-}
-
-impl TryFrom<StoredDecoder> for MmseDecoder {
-    type Error = Error;
-
-    fn try_from(parts: StoredDecoder) -> Result<Self, Error> {
-        MmseDecoder::new(&parts.system, parts.limit)
-    }
 }
 
 impl MmseDecoder {
@@ -86,15 +64,9 @@ impl MmseDecoder {
         Ok(Self {
             layout: Layout::new(system),
             system: system.clone(),
-            limit,
             entries,
             symbols: symbol_tables(system)?,
         })
-    }
-
-    /// Number of entries, one per joint outcome.
-    pub fn outcomes(&self) -> usize {
-        self.entries.len()
     }
 
     /// The estimate of every joint outcome; `None` for an outcome of probability zero. The order is that of
@@ -187,8 +159,6 @@ mod tests {
         assert_eq!(listed[4 + 2], Some(decoder.decode_symbols(&[1, 2]).unwrap()));
         assert!(decoder.decode_symbols(&[0]).is_err());
         assert!(decoder.decode_symbols(&[0, 4]).is_err());
-        let json = serde_json::to_string(&decoder).unwrap();
-        assert_eq!(serde_json::from_str::<MmseDecoder>(&json).unwrap(), decoder);
         assert!(matches!(MmseDecoder::new(&system, 15), Err(Error::TooLarge { needed: 16, .. })));
     }
 

@@ -57,11 +57,6 @@ impl<'a> Active<'a> {
         })
     }
 
-    /// Number of breakpoints.
-    pub fn parameters(&self) -> usize {
-        self.exchange.len()
-    }
-
     /// The breakpoints of the group in the system.
     pub fn breakpoints(&self) -> &'a [f64] {
         self.group.quantizer.breakpoints()

@@ -1,10 +1,9 @@
 //! Newton's method with a modified Hessian, for breakpoints that must stay in increasing order.
 
 use crate::deadline::Deadline;
-use crate::derivatives::Derivatives;
 use crate::error::{Error, not_converged};
 use fewbits_numerics::error::{at_least_one, non_negative, positive};
-use nalgebra::{DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
 /// Name of the algorithm in errors.
@@ -91,14 +90,17 @@ impl Newton {
         positive("max_step", self.max_step)?;
         Ok(())
     }
+}
 
-    /// Settings that stop at the stationary point to which the start leads, even if it is a saddle.
-    pub fn to_nearest_stationary_point() -> Self {
-        Self {
-            at_saddle: AtSaddle::Stay,
-            ..Self::default()
-        }
-    }
+/// A value with its first and second derivatives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Derivatives {
+    /// The value.
+    pub value: f64,
+    /// First derivatives.
+    pub gradient: DVector<f64>,
+    /// Second derivatives.
+    pub hessian: DMatrix<f64>,
 }
 
 /// An objective to be maximised.
@@ -130,7 +132,8 @@ pub struct Stationary {
     pub evaluations: usize,
 }
 
-/// Maximises from `start`. If the deadline ends the iteration, it counts as not converged.
+/// Maximises from `b`, which is the last point afterwards, also if the iteration did not converge. If the deadline ends the iteration, it
+/// counts as not converged.
 ///
 /// ```text
 /// repeat
@@ -142,17 +145,6 @@ pub struct Stationary {
 /// until |step| <= tolerance; at a saddle step off along the eigenvector of the largest eigenvalue and continue
 /// ```
 pub fn climb(
-    objective: &impl Objective,
-    start: &[f64],
-    scale: f64,
-    newton: &Newton,
-    deadline: Deadline,
-) -> Result<Stationary, Error> {
-    ascend(objective, &mut start.to_vec(), scale, newton, deadline)
-}
-
-/// As [`climb`], from `b`, which is the last point afterwards, also if the iteration did not converge.
-pub(crate) fn ascend(
     objective: &impl Objective,
     b: &mut Vec<f64>,
     scale: f64,

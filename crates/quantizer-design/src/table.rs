@@ -91,12 +91,7 @@ impl JointTable {
 
     /// Number of outcomes.
     pub fn outcomes(&self) -> usize {
-        self.likelihood.len() / self.values().len()
-    }
-
-    /// Values of the unknown, the columns of the table.
-    pub fn values(&self) -> &[f64] {
-        self.model().values()
+        self.likelihood.len() / self.model().values().len()
     }
 
     /// Index of the outcome in which `symbols[n]` was received from sensor `n`.
@@ -123,7 +118,7 @@ impl JointTable {
             .sum()
     }
 
-    /// Maximum a posteriori value of the unknown, as an index into [`values`](Self::values); the first if several are equal.
+    /// Maximum a posteriori value of the unknown, as an index into [`ObservationModel::values`]; the first if several are equal.
     pub fn decide(&self, outcome: usize) -> usize {
         most_probable(self.model().weights(), self.likelihood(outcome))
     }
@@ -135,10 +130,10 @@ impl JointTable {
     /// # Errors
     /// If the prior is continuous.
     pub fn equivocation(&self) -> Result<f64, Error> {
-        if !self.model().prior().is_discrete() {
+        if self.model().prior().points().is_none() {
             return refuse("prior", "a continuous prior", "a discrete prior for a conditional entropy");
         }
-        let outcomes = self.likelihood.chunks_exact(self.values().len());
+        let outcomes = self.likelihood.chunks_exact(self.model().values().len());
         Ok(outcomes.map(|q| equivocation(self.model().weights(), q)).sum())
     }
 }

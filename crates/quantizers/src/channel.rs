@@ -98,22 +98,11 @@ impl Channel {
     /// A binary symmetric channel: each bit of the word is inverted with probability `crossover`, independently.
     ///
     /// `C[t, z] = eps^d (1 - eps)^(k - d)`, with `d` the Hamming distance of the words and `k` their bits. A crossover above 1/2 is
-    /// accepted.
-    ///
-    /// # Errors
-    /// If the labelling leaves words unused (use [`Channel::binary_symmetric_with_gaps`]) or `crossover` is not in `[0, 1]`.
-    pub fn binary_symmetric(labelling: &Labelling, crossover: f64) -> Result<Self, Error> {
-        if !labelling.is_complete() {
-            return refuse("levels", labelling.levels(), "a power of two, or `binary_symmetric_with_gaps`");
-        }
-        Self::binary_symmetric_with_gaps(labelling, crossover)
-    }
-
-    /// As [`Channel::binary_symmetric`], for labellings that do not use all words: an unused word is an output that no input maps to.
+    /// accepted. A word that the labelling does not use is an output that no input maps to.
     ///
     /// # Errors
     /// If `crossover` is not in `[0, 1]`.
-    pub fn binary_symmetric_with_gaps(labelling: &Labelling, crossover: f64) -> Result<Self, Error> {
+    pub fn binary_symmetric(labelling: &Labelling, crossover: f64) -> Result<Self, Error> {
         let eps = fewbits_numerics::error::within("crossover", crossover, 0.0, 1.0)?;
         let bits = labelling.bits();
         Self::from_fn(labelling.levels(), labelling.symbols(), |t, z| {
@@ -136,21 +125,6 @@ impl Channel {
             t if t == levels => erasure,
             t if t == z => 1.0 - erasure,
             _ => 0.0,
-        })
-    }
-
-    /// An error occurs with probability `error`, and every wrong symbol is equally likely (orthogonal signals, hard decisions).
-    ///
-    /// # Errors
-    /// If `levels < 2` or `error` is not in `[0, 1]`.
-    pub fn symmetric(levels: usize, error: f64) -> Result<Self, Error> {
-        fewbits_numerics::error::within("error", error, 0.0, 1.0)?;
-        Self::from_fn(levels, levels, |t, z| {
-            if t == z {
-                1.0 - error
-            } else {
-                error / (levels - 1) as f64
-            }
         })
     }
 
@@ -199,12 +173,6 @@ impl Channel {
             0.0
         }
     }
-
-    /// Whether the channel is the identity.
-    pub fn is_ideal(&self) -> bool {
-        self.inputs == self.outputs
-            && (0..self.inputs).all(|t| (0..self.inputs).all(|z| self.probability(t, z) == f64::from(u8::from(t == z))))
-    }
 }
 
 #[cfg(test)]
@@ -214,7 +182,7 @@ mod tests {
     #[test]
     fn a_clean_binary_channel_is_the_identity_for_any_labelling() {
         for labelling in [Labelling::gray(8).unwrap(), Labelling::new(vec![0, 3, 1, 2]).unwrap()] {
-            assert!(Channel::binary_symmetric(&labelling, 0.0).unwrap().is_ideal());
+            assert_eq!(Channel::binary_symmetric(&labelling, 0.0), Channel::ideal(labelling.levels()));
         }
     }
 
@@ -229,13 +197,9 @@ mod tests {
         assert!(Channel::from_rows(&[vec![1.5, 1.0], vec![-0.5, 0.0]]).is_err());
         assert!(Channel::from_rows(&[vec![0.5, 1.0], vec![0.5]]).is_err());
         assert!(Channel::from_rows(&[]).is_err());
-        let three = Labelling::natural(3).unwrap();
-        assert!(
-            Channel::binary_symmetric(&three, 0.1)
-                .unwrap_err()
-                .to_string()
-                .contains("power of two")
-        );
+        // A word without a level is never received where no bit is inverted.
+        let three = Channel::binary_symmetric(&Labelling::natural(3).unwrap(), 0.0).unwrap();
+        assert_eq!((three.inputs(), three.outputs(), three.probability(3, 2)), (3, 4, 0.0));
         assert!(Channel::binary_symmetric(&Labelling::natural(4).unwrap(), -0.1).is_err());
         assert!(Channel::symbol_erasure(4, f64::NAN).is_err());
         assert!(Channel::pulse_amplitude(4, 0.0).is_err());
@@ -246,7 +210,6 @@ mod tests {
     fn a_channel_too_large_for_memory_is_a_typed_error() {
         for levels in [1 << 40, usize::MAX] {
             assert!(matches!(Channel::ideal(levels), Err(Error::TooLarge { .. })));
-            assert!(matches!(Channel::symmetric(levels, 0.1), Err(Error::TooLarge { .. })));
             assert!(matches!(Channel::symbol_erasure(levels, 0.1), Err(Error::TooLarge { .. })));
             assert!(matches!(Channel::pulse_amplitude(levels, 10.0), Err(Error::TooLarge { .. })));
         }

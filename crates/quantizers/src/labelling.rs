@@ -124,11 +124,6 @@ impl Labelling {
         self.words.len()
     }
 
-    /// Whether every word is used.
-    pub(crate) fn is_complete(&self) -> bool {
-        self.levels == self.words.len()
-    }
-
     /// Word of symbol `symbol`; `None` if there is no such symbol.
     pub fn word(&self, symbol: usize) -> Option<u32> {
         self.words.get(symbol).copied()
@@ -217,7 +212,6 @@ mod tests {
     fn unused_words_come_behind_the_levels() {
         let three = Labelling::with_words(2, vec![0, 1, 3]).unwrap();
         assert_eq!((three.levels(), three.symbols(), three.symbol(2), three.symbol(3)), (3, 4, 3, 2));
-        assert!(!three.is_complete());
     }
 
     #[test]

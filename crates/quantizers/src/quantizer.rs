@@ -138,11 +138,6 @@ impl Quantizer {
         self.labels.len()
     }
 
-    /// Whether cell `i` is level `i` for all `i`.
-    pub fn is_contiguous(&self) -> bool {
-        self.cells() == self.levels && self.labels.iter().enumerate().all(|(i, l)| i == *l)
-    }
-
     /// Level of the cell that contains `y`; a breakpoint is in the cell above it. Does not allocate. Infinite samples are in
     /// the outer cells.
     ///

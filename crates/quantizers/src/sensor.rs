@@ -18,8 +18,9 @@ use serde::{Deserialize, Serialize};
 /// use fewbits_core::{Gaussian, Link, Observation, Scheme};
 /// use fewbits_quantizers::{Labelling, QuantizingSensor, Quantizer, Symbol, lloyd_max};
 ///
-/// let sensor = QuantizingSensor::with_variance(Quantizer::from(&lloyd_max::gaussian(4)?), Labelling::gray(4)?, 0.5)?;
-/// let level = Symbol(sensor.quantizer().encode(1.2)?);
+/// let quantizer = Quantizer::from(&lloyd_max::gaussian(4)?);
+/// let level = Symbol(quantizer.encode(1.2)?);
+/// let sensor = QuantizingSensor::with_variance(quantizer, Labelling::gray(4)?, 0.5)?;
 /// let received = sensor.factor(&(), &Observation::Received(level), &Link::flipping(0.01)?)?;
 /// let posterior = received.tilted(&Gaussian::scalar(0.0, 1.0)?)?;
 /// assert!(posterior.mean[0] > 0.8 && posterior.covariance[0] < 0.6);
@@ -66,11 +67,6 @@ impl QuantizingSensor {
             labelling,
             noise_variance,
         })
-    }
-
-    /// The quantizer.
-    pub fn quantizer(&self) -> &Quantizer {
-        &self.quantizer
     }
 
     /// The words of the levels, which are the format of the reports.

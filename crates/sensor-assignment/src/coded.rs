@@ -9,12 +9,21 @@ use fewbits_numerics::error::{entries, positive, refuse};
 use fewbits_numerics::quadrature::gauss_legendre;
 use fewbits_quantizer_design::outcomes::{Feature, Table, explained, moments};
 
+/// The estimator whose exact error is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Estimator {
+    /// The decoder that returns the centre of the cell: `O(N)` operations per node.
+    CellCentre,
+    /// The posterior mean: `2^N` outcomes per node.
+    PosteriorMean,
+}
+
 /// Largest number of sensors: there are `2^N` cells.
 const MAX_SENSORS: usize = 16;
 /// Width of quadrature panels in noise standard deviations.
 const PANEL: f64 = 2.0;
 
-/// The first two moments of `u` at the nodes; for `u` see [`CodedSensors::centre_mse`].
+/// The first two moments of `u` at the nodes, for the decoder of centres.
 pub type Moments = (Vec<f64>, Vec<f64>);
 
 /// `N` sensors that send the `N` Gray code bits of `2^N` cells over `[-V, V]`, one bit each.
@@ -124,19 +133,27 @@ impl CodedSensors {
         Bank::new(self.source, sensors)
     }
 
-    /// Exact mean squared error of the posterior mean. Takes `2^N` outcomes per node.
+    /// Exact mean squared error of an assignment under `estimator`.
     ///
     /// # Errors
     /// If the assignment is not a permutation.
-    pub fn mmse(&self, assignment: &[usize]) -> Result<f64, Error> {
+    pub fn mse(&self, assignment: &[usize], estimator: Estimator) -> Result<f64, Error> {
         check_permutation(assignment, self.sensors())?;
+        Ok(match estimator {
+            Estimator::CellCentre => self.centre_mse(assignment),
+            Estimator::PosteriorMean => self.mmse(assignment),
+        })
+    }
+
+    /// Exact error of the posterior mean.
+    fn mmse(&self, assignment: &[usize]) -> f64 {
         // The first bit last, so that its two values are neighbours.
         let tables: Vec<&Table> = (1..self.sensors())
             .chain([0])
             .map(|bit| &self.probability[bit][assignment[bit]])
             .collect();
         let sums = moments(&tables, &self.features());
-        Ok(self.source.variance() - sums.chunks_exact(4).map(explained_by_pair).sum::<f64>())
+        self.source.variance() - sums.chunks_exact(4).map(explained_by_pair).sum::<f64>()
     }
 
     /// Weights of probability and first moment. The nodes cover one side, with the weight of both.
@@ -147,7 +164,7 @@ impl CodedSensors {
         [Feature::of_all(mass), Feature::of_all(moment)]
     }
 
-    /// Exact error of the decoder that reads the Gray bits as a cell index and returns the cell's centre. Takes `O(N)` per node.
+    /// Exact error of the decoder that reads the Gray bits as a cell index and returns the cell's centre.
     ///
     /// With `t_k = E[(-1)^(z_k)|x]` the centre is `-V u_1`, where `u_k = (-1)^(z_k) (1/2 + u_{k+1}/2)`. The first two moments of
     /// `u` therefore follow by recursion from the last bit:
@@ -157,18 +174,14 @@ impl CodedSensors {
     /// for k = N, ..., 1:   m1, m2 <- t_k (1/2 + m1/2),  1/4 + m1/2 + m2/4
     /// MSE = E[x^2 + 2 V x m1 + V^2 m2]
     /// ```
-    ///
-    /// # Errors
-    /// If the assignment is not a permutation.
-    pub fn centre_mse(&self, assignment: &[usize]) -> Result<f64, Error> {
-        check_permutation(assignment, self.sensors())?;
-        let zeros = || (vec![0.0; self.nodes.len()], vec![0.0; self.nodes.len()]);
+    fn centre_mse(&self, assignment: &[usize]) -> f64 {
+        let zeros = || (vec![0.0; self.nodes.x.len()], vec![0.0; self.nodes.x.len()]);
         let (mut moments, mut next) = (zeros(), zeros());
         for (bit, &sensor) in assignment.iter().enumerate().rev() {
             self.push_bit(bit, sensor, &moments, &mut next);
             std::mem::swap(&mut moments, &mut next);
         }
-        Ok(self.centre_error(&moments))
+        self.centre_error(&moments)
     }
 
     /// The estimate from one observation per bit, the most significant first: the centre of the cell that the Gray bits give. The sensors
@@ -190,7 +203,7 @@ impl CodedSensors {
         }
     }
 
-    /// One step of the recursion of [`centre_mse`](Self::centre_mse).
+    /// One step of the recursion for the decoder of centres.
     #[inline]
     #[doc(hidden)]
     pub fn push_bit(&self, bit: usize, sensor: usize, (m1, m2): &Moments, next: &mut Moments) {
@@ -268,8 +281,8 @@ mod tests {
                 .map(|(w, x)| w * (x - centre) * (x - centre))
                 .sum::<f64>();
         });
-        assert_relative_eq!(sensors.centre_mse(&assignment).unwrap(), exact, max_relative = 1e-11);
-        let mmse = sensors.mmse(&assignment).unwrap();
+        assert_relative_eq!(sensors.mse(&assignment, Estimator::CellCentre).unwrap(), exact, max_relative = 1e-11);
+        let mmse = sensors.mse(&assignment, Estimator::PosteriorMean).unwrap();
         assert!(mmse < exact);
         assert_relative_eq!(mmse, bank.mmse().unwrap(), max_relative = 1e-11);
     }
@@ -297,7 +310,7 @@ mod tests {
     #[test]
     fn one_bit_without_noise_leaves_half_a_cell() {
         let sensors = CodedSensors::with_variances(1.0, &[1e-8]).unwrap();
-        assert_relative_eq!(sensors.centre_mse(&[0]).unwrap(), 1.0 / 12.0, max_relative = 1e-3);
+        assert_relative_eq!(sensors.mse(&[0], Estimator::CellCentre).unwrap(), 1.0 / 12.0, max_relative = 1e-3);
     }
 
     #[test]
@@ -308,8 +321,10 @@ mod tests {
         assert!(CodedSensors::with_variances(1.0, &[0.1, 0.0]).is_err());
         let sensors = CodedSensors::with_variances(1.0, &[0.1, 0.2]).unwrap();
         for bad in [vec![0], vec![0, 0], vec![0, 2]] {
-            assert!(matches!(sensors.centre_mse(&bad), Err(Error::Argument(e)) if e.name == "assignment"));
-            assert!(sensors.mmse(&bad).is_err());
+            assert!(
+                matches!(sensors.mse(&bad, Estimator::CellCentre), Err(Error::Argument(e)) if e.name == "assignment")
+            );
+            assert!(sensors.mse(&bad, Estimator::PosteriorMean).is_err());
         }
     }
 }

@@ -56,6 +56,7 @@ pub fn bit_per_sensor(model: ObservationModel, link: Link) -> Result<Request<'st
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Estimator;
     use fewbits_quantizer_design::{Noise, Prior};
 
     /// The design starts from the assigned patterns, so it is no worse than their exact error.
@@ -70,7 +71,7 @@ mod tests {
             let mut request = bit_per_sensor(ObservationModel::new(prior, noise).unwrap(), Link::PERFECT).unwrap();
             request.starts = 2;
             let found = request.run().unwrap().best().value / (scale * scale);
-            let patterns = sensors.mmse(&assignment).unwrap();
+            let patterns = sensors.mse(&assignment, Estimator::PosteriorMean).unwrap();
             assert!(found <= patterns * (1.0 + 1e-6), "{found} {patterns}");
         }
     }

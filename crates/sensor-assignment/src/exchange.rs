@@ -1,19 +1,10 @@
 //! Local search for an assignment of small exact error.
 
-use super::CodedSensors;
+use super::{CodedSensors, Estimator};
 use crate::Error;
 
 /// Smallest relative improvement for which two sensors are exchanged.
 const IMPROVEMENT: f64 = 1e-12;
-
-/// The estimator whose exact error is computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Estimator {
-    /// The decoder that returns the centre of the cell.
-    CellCentre,
-    /// The posterior mean.
-    PosteriorMean,
-}
 
 /// The result of [`exchange`].
 #[derive(Debug, Clone, PartialEq)]
@@ -24,19 +15,6 @@ pub struct Exchanged {
     pub error: f64,
     /// Number of errors evaluated.
     pub evaluations: usize,
-}
-
-impl CodedSensors {
-    /// Exact error of an assignment under `estimator`.
-    ///
-    /// # Errors
-    /// If the assignment is not a permutation.
-    pub fn mse(&self, assignment: &[usize], estimator: Estimator) -> Result<f64, Error> {
-        match estimator {
-            Estimator::CellCentre => self.centre_mse(assignment),
-            Estimator::PosteriorMean => self.mmse(assignment),
-        }
-    }
 }
 
 /// Exchanges pairs of sensors as long as the exact error decreases, the best exchange first.
@@ -84,7 +62,7 @@ mod tests {
         for (i, j) in (0..5).flat_map(|i| (0..i).map(move |j| (i, j))) {
             let mut other = found.assignment.clone();
             other.swap(i, j);
-            assert!(sensors.mmse(&other).unwrap() >= found.error * (1.0 - 1e-9));
+            assert!(sensors.mse(&other, Estimator::PosteriorMean).unwrap() >= found.error * (1.0 - 1e-9));
         }
         assert!(exchange(&sensors, &[0, 0, 1, 2, 3], Estimator::CellCentre).is_err());
     }

@@ -2,7 +2,6 @@
 
 use super::even_nodes;
 use fewbits_binary_patterns::Error;
-use fewbits_binary_patterns::IMPOSSIBLE;
 use fewbits_binary_patterns::Nodes;
 use fewbits_binary_patterns::Source;
 use fewbits_binary_patterns::engine::{moments, squared_error};
@@ -11,6 +10,7 @@ use fewbits_numerics::golden::maximum;
 use fewbits_numerics::newton;
 use fewbits_numerics::normal::{cdf, inverse_mills, log_cdf, log_pdf};
 use fewbits_numerics::quadrature::gauss_legendre;
+use fewbits_quantizer_design::outcomes::IMPOSSIBLE;
 
 /// Largest number of sensors: the tree of bits has `2^N` leaves.
 const MAX_SENSORS: usize = 20;

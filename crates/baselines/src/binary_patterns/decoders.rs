@@ -97,7 +97,9 @@ fn division_map(bank: &Bank, grid: &Quantizer, scaled: impl Fn(f64, f64) -> f64)
     let tables = bank.groups().map(|(sensor, count)| {
         let bit = |bit: usize, cell: &Cell| {
             let pairs = cell.nodes.x.iter().zip(&cell.nodes.w);
-            let joint: f64 = pairs.map(|(&x, &w)| w * sensor.probabilities(x)[bit]).sum();
+            let joint: f64 = pairs
+                .map(|(&x, &w)| w * sensor.quantizer().probabilities(x, sensor.noise_deviation())[bit])
+                .sum();
             log(scaled(joint, cell.mass))
         };
         let rows = [0, 1].map(|b| cells.iter().map(|cell| bit(b, cell)).collect::<Vec<_>>());
@@ -119,7 +121,7 @@ fn exact_division_map(bank: &Bank, grid: &Quantizer, outcomes: usize) -> Vec<f64
     for cell in &cells {
         nodes.x.extend(&cell.nodes.x);
         nodes.w.extend(&cell.nodes.w);
-        ends.push(nodes.len());
+        ends.push(nodes.x.len());
     }
     let mut estimates = vec![0.0; outcomes];
     let mut score = vec![0.0; cells.len()];

@@ -2,6 +2,8 @@
 //! recommended designs are in [`search`](fewbits_binary_patterns::search). All errors are computed exactly.
 
 mod adaptive;
+mod centralised;
+mod conditional_mean;
 pub mod count;
 mod decoders;
 mod information;
@@ -12,6 +14,8 @@ mod separation;
 mod strategies;
 
 pub use adaptive::{AdaptiveErrors, AdaptiveRule, adaptive, bounded_mle};
+pub use centralised::centralised_bound;
+pub use conditional_mean::ConditionalMean;
 pub use decoders::Decoder;
 pub use information::printed_crlb;
 pub use luo::{Luo, LuoErrors};

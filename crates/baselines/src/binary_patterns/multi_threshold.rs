@@ -125,7 +125,7 @@ struct Objective {
 
 impl Objective {
     fn of(rows: &[(usize, Vec<f64>)], rho: &[f64], nodes: &Nodes) -> Self {
-        let mut information = vec![0.0; nodes.len()];
+        let mut information = vec![0.0; nodes.x.len()];
         for ((first, row), r) in rows.iter().zip(rho) {
             for (m, i) in information[*first..].iter_mut().zip(row) {
                 *m += r * i;

@@ -1,7 +1,7 @@
 //! Remote rate-distortion bounds (appendix B.1): the source is observed in noise, and a limited number of bits describes the observation.
-//! [`centralised_bound`](fewbits_binary_patterns::bounds::centralised_bound) is tighter.
+//! [`centralised_bound`](super::centralised_bound) is tighter.
 
-use fewbits_binary_patterns::bounds::ConditionalMean;
+use super::ConditionalMean;
 use fewbits_binary_patterns::engine::Kind;
 use fewbits_binary_patterns::{Error, Source};
 use fewbits_numerics::error::{at_least_one, non_negative, positive};

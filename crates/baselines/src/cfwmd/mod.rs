@@ -4,6 +4,7 @@
 pub mod centre;
 mod cross_covariance;
 pub mod imputing;
+pub mod information;
 mod particles;
 pub mod trigger;
 mod weighing;

@@ -18,7 +18,7 @@ use super::gains::single_sensor;
 use fewbits_numerics::error::refuse;
 use fewbits_quantizer_design::engine::Problem;
 use fewbits_quantizer_design::{Criterion, Error, System};
-use fewbits_quantizers::Quantizer;
+use fewbits_quantizers::{Channel, Quantizer};
 
 /// Largest number of candidates; the work grows with its square.
 const MAX_CANDIDATES: usize = 2000;
@@ -35,7 +35,7 @@ pub fn best_contiguous(
     candidates: &[f64],
 ) -> Result<(Quantizer, f64), Error> {
     let entry = single_sensor(system, group)?;
-    if !entry.channel.is_ideal() {
+    if entry.channel != Channel::ideal(entry.channel.inputs())? {
         return refuse("channel", "not ideal", "an ideal channel: cell values do not add up behind a noisy one");
     }
     let levels = entry.channel.inputs();

@@ -58,7 +58,7 @@ impl LevelGains {
         let (channel, values) = (&entry.channel, model.values().len());
         let outputs = channel.outputs();
         // Log likelihoods, and the index of an outcome in their table.
-        let (logs, is_by_group) = if model.prior().is_discrete() {
+        let (logs, is_by_group) = if model.prior().points().is_some() {
             // If hypotheses are far apart, the probability of a wrong symbol underflows, but its logarithm is needed.
             (log_likelihoods(system)?, true)
         } else {
@@ -187,9 +187,9 @@ fn scores(model: &ObservationModel, criterion: Criterion, log_likelihood: &[f64]
         Criterion::MeanSquaredError => {
             let terms = model.weights().iter().zip(model.values()).zip(log_likelihood);
             let moment: f64 = terms
-                .map(|((w, x), l)| w * (x - model.sample_mean()) * relative(l))
+                .map(|((w, x), l)| w * (x - model.prior().mean()) * relative(l))
                 .sum();
-            let mean = model.sample_mean() + if total > 0.0 { moment / total } else { 0.0 };
+            let mean = model.prior().mean() + if total > 0.0 { moment / total } else { 0.0 };
             for (o, x) in out.iter_mut().zip(model.values()) {
                 *o = -(x - mean) * (x - mean);
             }

@@ -124,8 +124,8 @@ pub fn assign_words(
         for (n, class) in combination.iter().enumerate() {
             let words = &classes[*class];
             let labelling = Labelling::with_words(bits, words.clone())?;
-            let channel = Channel::binary_symmetric_with_gaps(&labelling, crossover)?;
-            let sample = lloyd_max::gaussian(words.len())?.affine(model.sample_mean(), model.sample_deviation(n))?;
+            let channel = Channel::binary_symmetric(&labelling, crossover)?;
+            let sample = lloyd_max::gaussian(words.len())?.affine(model.prior().mean(), model.sample_deviation(n))?;
             groups.push(SensorGroup {
                 quantizer: Quantizer::from(&sample),
                 channel,

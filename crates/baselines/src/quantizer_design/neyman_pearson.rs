@@ -27,7 +27,7 @@ impl NeymanPearson {
         if !(false_alarm > 0.0 && false_alarm < 1.0) {
             return refuse("false_alarm", false_alarm, "a probability inside (0, 1)");
         }
-        if !system.model().prior().is_discrete() || system.model().values().len() != 2 {
+        if system.model().prior().points().is_none() || system.model().values().len() != 2 {
             return refuse("prior", "not two hypotheses", "a discrete prior on two values");
         }
         let table = JointTable::new(system)?;

@@ -86,7 +86,7 @@ pub fn separate(
         distance,
         sensor: Active::new(&system, 0)?,
     };
-    let found = climb(&objective, start.breakpoints(), deviation, newton, Deadline::NEVER)?;
+    let found = climb(&objective, &mut start.breakpoints().to_vec(), deviation, newton, Deadline::NEVER)?;
     let (p0, p1) = objective.distributions(&found.point);
     Ok((start.with_breakpoints(found.point)?, distance.of(&p0, &p1)))
 }
@@ -140,7 +140,7 @@ impl Objective for Separated<'_> {
     }
 
     fn blocks(&self) -> Vec<usize> {
-        vec![self.sensor.parameters()]
+        vec![self.sensor.exchange.len()]
     }
 
     fn unit(&self, value: f64) -> f64 {

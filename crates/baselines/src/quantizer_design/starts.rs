@@ -3,7 +3,7 @@
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::normal;
 use fewbits_quantizer_design::design::{Design, joint};
-use fewbits_quantizer_design::{Criterion, Error, Newton, System};
+use fewbits_quantizer_design::{Certificate, Criterion, Error, Newton, System};
 use rand::RngExt;
 
 /// The best of the results of [`joint`] from the system's own quantizers and from `starts` random ones, with the same labels and channels.
@@ -26,9 +26,9 @@ pub fn multi_start(
             continue;
         };
         // A maximum is preferred to a saddle, even if the saddle has the better value.
-        let is_better = |design: &Design| match (design.is_saddle(), candidate.is_saddle()) {
-            (true, false) => true,
-            (false, true) => false,
+        let is_better = |design: &Design| match [design, &candidate].map(|d| d.certificate == Certificate::Saddle) {
+            [true, false] => true,
+            [false, true] => false,
             _ => criterion.sense() * (candidate.value - design.value) > 0.0,
         };
         if best.as_ref().ok().is_none_or(is_better) {
@@ -48,7 +48,7 @@ pub fn random_starts(system: &System, starts: usize, seed: u64) -> Vec<System> {
 /// The system with random ordered breakpoints.
 fn random_system(system: &System, stream: Stream) -> Result<System, Error> {
     let mut rng = stream.rng();
-    let mean = system.model().sample_mean();
+    let mean = system.model().prior().mean();
     let quantizers = system
         .groups()
         .iter()

@@ -1,12 +1,12 @@
 //! The posterior mean given the bits of a bank, its table over all outcomes, and exact errors.
 
 use super::sums::{moments, squared_error};
-use crate::observation::bank::{Bank, IMPOSSIBLE};
+use crate::observation::bank::Bank;
 use crate::observation::source::Nodes;
 use crate::{Error, LookupTable, PatternSensor};
 use fewbits_core::Observation;
-use fewbits_numerics::error::{entries, finite};
-use fewbits_quantizer_design::outcomes::{Table, for_each_log};
+use fewbits_numerics::error::entries;
+use fewbits_quantizer_design::outcomes::{IMPOSSIBLE, Table, for_each_log};
 
 impl Bank {
     /// The posterior mean from one observation per sensor, without a table. A missing bit carries no information.
@@ -18,13 +18,12 @@ impl Bank {
         Ok(mean_under(&score, &nodes))
     }
 
-    /// `E[(x - estimate)^2 | observations]` from one observation per sensor, in squared units of the source. A missing bit carries no
-    /// information. At the posterior mean it is the posterior variance.
-    ///
-    /// # Errors
-    /// If the number of observations is not the number of sensors, or `estimate` is not finite.
-    pub fn posterior_squared_error(&self, observations: &[Observation<bool>], estimate: f64) -> Result<f64, Error> {
-        finite("estimate", estimate)?;
+    /// `E[(x - estimate)^2 | observations]`: at the posterior mean the posterior variance.
+    pub(crate) fn posterior_squared_error(
+        &self,
+        observations: &[Observation<bool>],
+        estimate: f64,
+    ) -> Result<f64, Error> {
         let (score, nodes) = self.posterior_score(observations)?;
         let w = weights_under(&score, &nodes);
         let (mass, _) = moments(&w, &nodes.x);
@@ -39,7 +38,7 @@ impl Bank {
     fn posterior_score(&self, observations: &[Observation<bool>]) -> Result<(Vec<f64>, Nodes), Error> {
         entries("observations", observations.len(), self.sensors())?;
         let nodes = self.fine_nodes();
-        let mut score = vec![0.0; nodes.len()];
+        let mut score = vec![0.0; nodes.x.len()];
         for (n, observation) in observations.iter().enumerate() {
             let Some(bit) = observation.received() else {
                 continue;

@@ -1,37 +1,15 @@
 //! Estimates for every outcome of a bank, as a table.
 
 use super::sums::squared_error;
-use crate::observation::source::Nodes;
 use crate::{Bank, Error};
 use fewbits_core::Observation;
 use fewbits_numerics::error::{all_finite, entries};
-use serde::{Deserialize, Serialize};
-
-/// Largest number of sensors for a table over bit strings.
-const MAX_TABLE_SENSORS: usize = 24;
 
 /// Estimates for every outcome of a bank.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredTable")]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LookupTable {
     bank: Bank,
     estimates: Vec<f64>,
-}
-
-/// The stored form of [`LookupTable`].
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredTable {
-    bank: Bank,
-    estimates: Vec<f64>,
-}
-
-impl TryFrom<StoredTable> for LookupTable {
-    type Error = Error;
-
-    fn try_from(StoredTable { bank, estimates }: StoredTable) -> Result<Self, Error> {
-        LookupTable::new(bank, estimates)
-    }
 }
 
 impl LookupTable {
@@ -83,45 +61,6 @@ impl LookupTable {
     pub fn estimate(&self, bits: &[bool]) -> Result<f64, Error> {
         Ok(self.estimates[self.bank.index_of(bits)?])
     }
-
-    /// Number of stored outcomes that the estimate distinguishes.
-    pub fn outcomes(&self) -> usize {
-        self.estimates.len()
-    }
-
-    /// `(E[xhat|x] - x, Var[xhat|x])`: bias and variance of the estimate, given the value `x` of the source.
-    ///
-    /// # Errors
-    /// If `x` is not finite.
-    pub fn conditional_error(&self, x: f64) -> Result<(f64, f64), Error> {
-        let x = fewbits_numerics::error::finite("x", x)?;
-        let at = Nodes {
-            x: vec![x],
-            w: vec![1.0],
-        };
-        let (mut mean, mut second) = (0.0, 0.0);
-        self.bank.for_outcomes(&at, |index, w| {
-            let off = self.estimates[index] - x;
-            mean += w[0] * off;
-            second += w[0] * off * off;
-        });
-        Ok((mean, (second - mean * mean).max(0.0)))
-    }
-
-    /// The estimates of all `2^N` bit strings; sensor 1 is the most significant bit of the index.
-    ///
-    /// # Errors
-    /// If there are more than 24 sensors.
-    pub fn expand(&self) -> Result<Vec<f64>, Error> {
-        let sensors = self.bank.sensors();
-        Error::at_most("the table of outcomes", 2u128.saturating_pow(sensors as u32), 1u128 << MAX_TABLE_SENSORS)?;
-        (0usize..1 << sensors)
-            .map(|word| {
-                let bits: Vec<bool> = (0..sensors).rev().map(|at| word >> at & 1 == 1).collect();
-                self.estimate(&bits)
-            })
-            .collect()
-    }
 }
 
 #[cfg(test)]
@@ -147,8 +86,6 @@ mod tests {
             let full = [bits[0], bits[1], true];
             assert_eq!(table.decode(&seen).unwrap(), table.estimate(&full).unwrap());
         }
-        let json = serde_json::to_string(&table).unwrap();
-        assert_eq!(serde_json::from_str::<LookupTable>(&json).unwrap(), table);
     }
 
     /// The mean squared error of every outcome, weighted by its probability, is the mean squared error of the table.
@@ -169,7 +106,7 @@ mod tests {
                     .map(|i| {
                         let x = -1.0 + 2.0 * f64::from(i) / f64::from(steps);
                         let end = if i == 0 || i == steps { 0.5 } else { 1.0 };
-                        let given = |n: usize| bank.sensor(n).probabilities(x)[usize::from(bits[n])];
+                        let given = |n: usize| bank.sensor(n).quantizer().probabilities(x, 0.2)[usize::from(bits[n])];
                         end * given(0) * given(1) * given(2) / f64::from(steps)
                     })
                     .sum();

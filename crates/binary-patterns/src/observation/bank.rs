@@ -5,13 +5,9 @@ use crate::{BinaryQuantizer, Error, PatternSensor, Source};
 use fewbits_numerics::error::{at_least_one, entries};
 use fewbits_numerics::quadrature::gauss_legendre;
 use fewbits_quantizer_design::outcomes::{Table, for_each};
-use serde::{Deserialize, Serialize};
 
 /// Largest number of outcomes that may be enumerated.
 pub(crate) const MAX_OUTCOMES: u128 = 1 << 26;
-
-/// Outcomes of smaller probability are left out; their contribution to any error is below `1e-280`.
-pub const IMPOSSIBLE: f64 = 1e-290;
 
 /// Width of quadrature panels in noise standard deviations; with twelve nodes per panel the integrals have an error of `1e-12`.
 const PANEL: f64 = 2.0;
@@ -20,8 +16,7 @@ const PANEL: f64 = 2.0;
 ///
 /// Sensors with equal quantizer and noise are exchangeable: only the number of them that report 1 matters. The bank groups them, so
 /// fifty sensors in three groups of 17, 16 and 17 have 5508 outcomes instead of `2^50`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredBank", into = "StoredBank")]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Bank {
     source: Source,
     groups: Vec<Exchangeable>,
@@ -34,31 +29,6 @@ pub struct Bank {
 struct Exchangeable {
     sensor: PatternSensor,
     count: usize,
-}
-
-/// The stored form of [`Bank`].
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredBank {
-    source: Source,
-    sensors: Vec<PatternSensor>,
-}
-
-impl From<Bank> for StoredBank {
-    fn from(bank: Bank) -> Self {
-        Self {
-            source: bank.source,
-            sensors: (0..bank.sensors()).map(|n| bank.sensor(n).clone()).collect(),
-        }
-    }
-}
-
-impl TryFrom<StoredBank> for Bank {
-    type Error = Error;
-
-    fn try_from(parts: StoredBank) -> Result<Self, Error> {
-        Bank::new(parts.source, parts.sensors)
-    }
 }
 
 impl Bank {
@@ -144,7 +114,7 @@ impl Bank {
     pub fn fisher_information(&self, x: f64) -> f64 {
         self.groups
             .iter()
-            .map(|g| g.count as f64 * g.sensor.fisher_information(x))
+            .map(|g| g.count as f64 * g.sensor.quantizer().fisher_information(x, g.sensor.noise_deviation()))
             .sum()
     }
 

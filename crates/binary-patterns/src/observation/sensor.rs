@@ -3,30 +3,12 @@
 use crate::{BinaryQuantizer, Error};
 use fewbits_core::{Noise, Quantized};
 use fewbits_numerics::error::positive;
-use serde::{Deserialize, Serialize};
 
 /// A sensor that measures `Y = X + N(0, noise_deviation^2)` and reports the bit of its quantizer.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredSensor")]
+#[derive(Debug, Clone, PartialEq)]
 pub struct PatternSensor {
     quantizer: BinaryQuantizer,
     noise_deviation: f64,
-}
-
-/// The stored form of [`PatternSensor`].
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredSensor {
-    quantizer: BinaryQuantizer,
-    noise_deviation: f64,
-}
-
-impl TryFrom<StoredSensor> for PatternSensor {
-    type Error = Error;
-
-    fn try_from(parts: StoredSensor) -> Result<Self, Error> {
-        PatternSensor::with_deviation(parts.quantizer, parts.noise_deviation)
-    }
 }
 
 impl PatternSensor {
@@ -52,19 +34,9 @@ impl PatternSensor {
         self.noise_deviation
     }
 
-    /// `[P(0|x), P(1|x)]`.
-    pub fn probabilities(&self, x: f64) -> [f64; 2] {
-        self.quantizer.probabilities(x, self.noise_deviation)
-    }
-
     /// `[ln P(0|x), ln P(1|x)]`.
     pub fn log_probabilities(&self, x: f64) -> [f64; 2] {
         self.quantizer.log_probabilities(x, self.noise_deviation)
-    }
-
-    /// Fisher information about `x` in the sensor's bit.
-    pub fn fisher_information(&self, x: f64) -> f64 {
-        self.quantizer.fisher_information(x, self.noise_deviation)
     }
 }
 

@@ -5,33 +5,14 @@ use fewbits_numerics::error::{finite, positive, refuse};
 use fewbits_numerics::normal::pdf;
 use fewbits_numerics::quadrature::Rule;
 use fewbits_quantizer_design::Prior;
-use serde::{Deserialize, Serialize};
 
 /// A Gaussian source is integrated over this many standard deviations to either side; the rest is below `1e-18`.
 const GAUSSIAN_REACH: f64 = 9.0;
 
 /// A zero-mean scalar source `X`, symmetric about zero.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Kind", into = "Kind")]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Source {
     kind: Kind,
-}
-
-impl From<Source> for Kind {
-    fn from(source: Source) -> Self {
-        source.kind
-    }
-}
-
-impl TryFrom<Kind> for Source {
-    type Error = Error;
-
-    fn try_from(kind: Kind) -> Result<Self, Error> {
-        match kind {
-            Kind::Uniform { half_width } => Self::uniform(half_width),
-            Kind::Gaussian { deviation } => Self::gaussian_with_deviation(deviation),
-        }
-    }
 }
 
 impl TryFrom<&Source> for Prior {
@@ -47,8 +28,7 @@ impl TryFrom<&Source> for Prior {
 }
 
 /// Distribution of a [`Source`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
     /// Uniform on `[-half_width, half_width]`.
     Uniform {
@@ -192,16 +172,6 @@ pub struct Nodes {
 }
 
 impl Nodes {
-    /// Number of nodes.
-    pub fn len(&self) -> usize {
-        self.x.len()
-    }
-
-    /// Whether there is no node.
-    pub fn is_empty(&self) -> bool {
-        self.x.is_empty()
-    }
-
     /// Nodes on `[from, to]`, dense near thresholds and sparse where all bits are certain.
     ///
     /// Panels near a threshold have a width of `share` times its noise deviation. The number of nodes therefore depends on the number of
@@ -264,7 +234,7 @@ mod tests {
             let integral = |u: f64| u * cdf(u) + pdf(u);
             let exact = 0.5 * noise * (integral(0.75 / noise) - integral(-1.25 / noise));
             assert_relative_eq!(p, exact, max_relative = 1e-12);
-            last = nodes.len();
+            last = nodes.x.len();
         }
         assert!(last < 600, "{last}");
     }

@@ -5,7 +5,6 @@ use crate::Error;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::refuse;
 use fewbits_quantizers::Quantizer;
-use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
@@ -20,8 +19,7 @@ use std::str::FromStr;
 /// assert_eq!(pattern.to_string(), "00111100");
 /// # Ok::<(), fewbits_binary_patterns::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "String")]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Pattern {
     bits: Vec<bool>,
 }
@@ -82,33 +80,6 @@ impl Pattern {
                 bits: (0..cells).rev().map(|at| word >> at & 1 == 1).collect(),
             })
             .collect())
-    }
-
-    /// The pattern over `grid` of this quantizer; `None` unless all its breakpoints are edges of the grid (to `1e-9` of its extent).
-    pub(crate) fn of(quantizer: &BinaryQuantizer, grid: &Quantizer) -> Option<Self> {
-        let edges = grid.breakpoints();
-        let slack = 1e-9 * edges.iter().fold(0.0, |m, e| f64::max(m, e.abs()));
-        let places = quantizer
-            .breakpoints()
-            .iter()
-            .map(|b| edges.iter().position(|e| (e - b).abs() <= slack))
-            .collect::<Option<Vec<_>>>()?;
-        let bit = |cell: usize| places.iter().filter(|at| **at < cell).count() % 2 == 1;
-        Self::new((0..grid.cells()).map(bit).collect()).ok()
-    }
-}
-
-impl TryFrom<String> for Pattern {
-    type Error = Error;
-
-    fn try_from(text: String) -> Result<Self, Error> {
-        text.parse()
-    }
-}
-
-impl From<Pattern> for String {
-    fn from(pattern: Pattern) -> Self {
-        pattern.to_string()
     }
 }
 

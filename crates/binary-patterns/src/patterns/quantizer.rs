@@ -4,7 +4,6 @@ use crate::Error;
 use fewbits_numerics::normal::{interval, log_interval, pdf};
 use fewbits_quantizer_design::outcomes::{Table, cell_probabilities};
 use fewbits_quantizers::Quantizer;
-use serde::{Deserialize, Serialize};
 
 /// Beyond this many standard deviations the tail probability underflows.
 const VANISHED: f64 = 39.0;
@@ -14,23 +13,8 @@ const VANISHED: f64 = 39.0;
 /// Every one-bit quantizer of a scalar has this form, up to the names of its outputs, whatever [`Pattern`] it came from.
 ///
 /// [`Pattern`]: crate::Pattern
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
+#[derive(Debug, Clone, PartialEq)]
 pub struct BinaryQuantizer(Quantizer);
-
-impl TryFrom<Vec<f64>> for BinaryQuantizer {
-    type Error = Error;
-
-    fn try_from(breakpoints: Vec<f64>) -> Result<Self, Error> {
-        Self::new(breakpoints)
-    }
-}
-
-impl From<BinaryQuantizer> for Vec<f64> {
-    fn from(binary: BinaryQuantizer) -> Self {
-        binary.breakpoints().to_vec()
-    }
-}
 
 impl BinaryQuantizer {
     /// A quantizer with strictly increasing finite breakpoints, at least one.

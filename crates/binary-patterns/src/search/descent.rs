@@ -3,12 +3,11 @@
 use super::outcomes::{Candidates, Outcomes};
 use crate::Error;
 use crate::observation::bank::MAX_OUTCOMES;
-use crate::{Bank, BinaryQuantizer, Pattern, PatternSensor, Source};
+use crate::{Bank, BinaryQuantizer, PatternSensor, Source};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{at_least_one, positive, refuse};
 use fewbits_quantizer_design::outcomes::Table;
-use fewbits_quantizers::Quantizer;
 use nalgebra::DMatrix;
 use rand::RngExt;
 
@@ -36,14 +35,6 @@ pub struct Descent {
     source: Source,
     noise: Vec<f64>,
     candidates: Vec<BinaryQuantizer>,
-}
-
-impl Descended {
-    /// The pattern of each sensor over `grid`; `None` if its breakpoints are not the grid's. [`mask_of`](crate::mask_of) gives a linear
-    /// one's mask.
-    pub fn patterns(&self, grid: &Quantizer) -> Vec<Option<Pattern>> {
-        self.sensors.iter().map(|s| Pattern::of(s.quantizer(), grid)).collect()
-    }
 }
 
 /// A local optimum.
@@ -80,18 +71,12 @@ impl Descent {
     }
 
     /// The bank of a choice, one candidate index per sensor.
-    ///
-    /// # Errors
-    /// If there is not one choice per sensor, or one is not the index of a candidate.
-    pub fn bank(&self, choice: &[usize]) -> Result<Bank, Error> {
+    fn bank(&self, choice: &[usize]) -> Result<Bank, Error> {
         Bank::new(self.source, self.sensors(choice)?)
     }
 
     /// The sensors of a choice.
-    ///
-    /// # Errors
-    /// As [`Self::bank`].
-    pub fn sensors(&self, choice: &[usize]) -> Result<Vec<PatternSensor>, Error> {
+    fn sensors(&self, choice: &[usize]) -> Result<Vec<PatternSensor>, Error> {
         self.check(choice)?;
         choice
             .iter()
@@ -252,9 +237,9 @@ impl<'a> Kernel<'a> {
 mod tests {
     use super::super::LinearSearch;
     use super::*;
-    use crate::uniform_cells;
-    use crate::{linear_pattern, mask_of, rank};
+    use crate::{Pattern, linear_pattern, rank, uniform_cells};
     use approx::assert_relative_eq;
+    use fewbits_quantizers::Quantizer;
 
     fn masks(grid: &Quantizer) -> Vec<BinaryQuantizer> {
         let bits = grid.cells().trailing_zeros() as usize;
@@ -278,12 +263,6 @@ mod tests {
             let start = vec![3, 5, 2, 3, 5, 2];
             let found = descent.run(&[start], 6, full).unwrap();
             assert_relative_eq!(found.mse, exact.mse, max_relative = 1e-10);
-            let chosen: Vec<u32> = found
-                .patterns(&grid)
-                .iter()
-                .map(|p| mask_of(p.as_ref().unwrap()).unwrap())
-                .collect();
-            assert_eq!(chosen, found.choice.iter().map(|&c| c as u32 + 1).collect::<Vec<_>>());
         }
     }
 

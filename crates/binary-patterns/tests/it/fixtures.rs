@@ -2,10 +2,10 @@
 
 use crate::entry::{Entry, check};
 use fewbits_baselines::binary_patterns::{
-    AdaptiveErrors, AdaptiveRule, Decoder, Luo, adaptive, by_information, count, fixed_threshold,
+    AdaptiveErrors, AdaptiveRule, Decoder, Luo, adaptive, by_information, centralised_bound, count, fixed_threshold,
     multi_threshold_bound, network_rate_distortion, printed_crlb, printed_gaussian_cells, remote_distortion,
 };
-use fewbits_binary_patterns::bounds::{centralised_bound, optimal_weight_van_trees};
+use fewbits_binary_patterns::bounds::optimal_weight_van_trees;
 use fewbits_binary_patterns::search::{LinearSearch, MaskSet, free_breakpoints};
 use fewbits_binary_patterns::{
     Bank, Mask, Pattern, PatternSensor, Source, gray_basis, linear_pattern, natural_basis, uniform_cells,

@@ -1,7 +1,6 @@
 //! Wild arguments: sources, grids, quantizers and banks answer numbers or errors.
 
-use fewbits_baselines::binary_patterns::{bounded_mle, printed_gaussian_cells, remote_distortion};
-use fewbits_binary_patterns::bounds::centralised_bound;
+use fewbits_baselines::binary_patterns::{bounded_mle, centralised_bound, printed_gaussian_cells, remote_distortion};
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, PatternSensor, Source, uniform_cells};
 use fewbits_core::{Link, Observation, Scheme, factor::Factor, laws::wild};
 use fewbits_quantizers::Quantizer;
@@ -35,9 +34,9 @@ proptest! {
         for quantizer in [BinaryQuantizer::new(x[..count].to_vec()), BinaryQuantizer::new(sorted)].into_iter().flatten() {
             let _ = quantizer.encode(x[5]);
             let Ok(sensor) = PatternSensor::with_deviation(quantizer, x[6]) else { continue };
-            let p = sensor.probabilities(x[7]);
+            let p = sensor.quantizer().probabilities(x[7], x[6]);
             prop_assert!(!x[7].is_finite() || (p[0] + p[1] - 1.0).abs() < 1e-9, "{:?} {}: {:?}", sensor, x[7], p);
-            prop_assert!(!x[7].is_finite() || !sensor.fisher_information(x[7]).is_nan(), "{:?} {}", sensor, x[7]);
+            prop_assert!(!x[7].is_finite() || !sensor.quantizer().fisher_information(x[7], x[6]).is_nan(), "{:?} {}", sensor, x[7]);
             let link = Link::new(x[0], x[1]).unwrap_or(Link::PERFECT);
             if let Ok(factor) = sensor.factor(&(), &Observation::Received(bits % 2 == 0), &link) {
                 prop_assert!(!x[7].is_finite() || !factor.log_likelihood(&[x[7]].into()).is_nan(), "{:?}", factor);
@@ -74,11 +73,11 @@ proptest! {
             let Ok(quantizer) = BinaryQuantizer::new(breakpoints) else { continue };
             let Ok(bank) = Bank::homogeneous_with_deviation(source, vec![quantizer; count], x[1]) else { continue };
             let seen: Vec<_> = (0..count).map(|i| if i == 0 { Observation::Received(true) } else { Observation::Nothing }).collect();
-            for number in [bank.mmse(), bank.table().map(|table| table.mse()), bank.posterior_mean(&seen), bank.posterior_squared_error(&seen, x[5])].into_iter().flatten() {
+            for number in [bank.mmse(), bank.table().map(|table| table.mse()), bank.posterior_mean(&seen)].into_iter().flatten() {
                 prop_assert!(!number.is_nan(), "{:?} {:?}", x, number);
             }
             if let Ok(table) = bank.table() {
-                for number in [table.decode(&seen), table.conditional_error(x[5]).map(|e| e.0 + e.1)].into_iter().flatten() {
+                for number in table.decode_with_error(&seen).into_iter().flat_map(|(mean, error)| [mean, error]) {
                     prop_assert!(!number.is_nan(), "{:?} {:?}", x, number);
                 }
             }

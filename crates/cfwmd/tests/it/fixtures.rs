@@ -2,9 +2,9 @@
 
 use crate::Silence;
 use fewbits_baselines::cfwmd::cross_covariance_step;
+use fewbits_baselines::cfwmd::information::{Direction, divergence};
 use fewbits_baselines::cfwmd::trigger::StochasticTrigger;
 use fewbits_cfwmd::ellipsoid::Ellipsoid;
-use fewbits_cfwmd::information::{Direction, divergence};
 use fewbits_cfwmd::rule::{OwnRecursion, OwnStep};
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::{Factor, Gaussian};

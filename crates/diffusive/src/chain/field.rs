@@ -1,24 +1,18 @@
 //! What every node of a search knows: the models of the medium, where the nodes are, and who reaches whom.
 
+use crate::Error;
 use crate::model_grid::ModelGrid;
-use crate::{Error, SourceSensor};
 use fewbits_numerics::error::refuse;
 use fewbits_topology::{Deployment, Graph};
 
 /// Models of the medium, positions of the nodes and the graph of their radios. All nodes know them before a search.
 ///
-/// A single [`SourceSensor`] is a grid of one model. With several, each has its own posterior of all records, weighted by its evidence.
+/// A single [`SourceSensor`](crate::SourceSensor) is a grid of one model. With several, each has its own posterior of all records, weighted by its evidence.
 #[derive(Debug, Clone)]
 pub struct SearchField {
     models: ModelGrid,
     deployment: Deployment,
     graph: Graph,
-}
-
-impl From<SourceSensor> for ModelGrid {
-    fn from(sensor: SourceSensor) -> Self {
-        Self::single(sensor)
-    }
 }
 
 impl SearchField {

@@ -131,7 +131,7 @@ fn posterior_within_a_wall_is_zero() {
 #[test]
 fn search_runs_on_any_model() {
     let sensor = opaque(false, None);
-    let alone = ModelGrid::single(sensor.clone());
+    let alone = ModelGrid::from(sensor.clone());
     for form in [Form::Raw, Form::Mixture(4)] {
         let (outcome, error) = searched((3, 150, 18.0, 1e-4), form, &alone, &sensor).unwrap();
         assert_eq!(outcome.status, Status::Converged);

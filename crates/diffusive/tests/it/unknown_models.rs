@@ -87,7 +87,7 @@ fn model_that_is_not_among_them_is_a_misfit() {
 /// One model is the plain search, to the bit.
 #[test]
 fn grid_of_one_model_is_the_plain_search() {
-    let alone = ModelGrid::single(with(40.0, 0.0));
+    let alone = ModelGrid::from(with(40.0, 0.0));
     let (status, models, error) = search(&with(40.0, 0.0), &alone, Form::Raw).unwrap();
     assert_eq!((status, models), (Status::Converged, vec![1.0]));
     assert!(error < 0.5);

@@ -5,14 +5,14 @@
 
 use fewbits_baselines::dymbo::first_message::{first_message_mse, first_message_value};
 use fewbits_baselines::dymbo::{
-    SignFilter, contours, iterated, scalar_fixed_lag_variance, skew_normal, steady_state, tree,
+    SignFilter, chain, contours, expected_information, iterated, scalar_fixed_lag_variance, skew_normal, steady_state,
+    tree,
 };
 use fewbits_core::factor::{Factor, Levels};
 use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
-use fewbits_dymbo::chain::{self, TransientStep};
 use fewbits_dymbo::{
     CountFusion, DymboFilter, MultibitFilter, Multiple, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant,
-    filtered_variance, sign_bit, steady,
+    filtered_variance,
 };
 use fewbits_filters::{PointMass, TransitionKernel, UniformGrid, assumed_density, kalman};
 use fewbits_models::{LinearGaussian, LinearSensor, ScalarSensor};
@@ -126,7 +126,7 @@ fn compute(entry: &Entry<'_>) -> Option<Vec<f64>> {
             let cell = fewbits_core::Cell::new(entry.number("lo"), entry.number("hi")).unwrap();
             Some(posterior(entry, &Levels::certain(cell, entry.number("sigma2")).unwrap()))
         }
-        "eta" => Some(vec![sign_bit::expected_information(entry.number("z"), &Link::PERFECT).unwrap()]),
+        "eta" => Some(vec![expected_information(entry.number("z"), &Link::PERFECT).unwrap()]),
         "lloyd_max" => {
             let quantizer = gaussian_table(entry.number("bits") as usize).unwrap();
             if entry.ends("tables") {
@@ -210,6 +210,14 @@ fn posterior(entry: &Entry<'_>, factor: &Levels) -> Vec<f64> {
     vec![after.mean[0], after.covariance[0]]
 }
 
+/// The filter's correction at its steady variance.
+fn steady_step(plant: ScalarPlant) -> f64 {
+    let steady = plant.steady_state(FRAC_2_PI).unwrap().filtered_variance;
+    let belief = Gaussian::scalar(0.0, steady).unwrap();
+    let above = Observation::Received(Sign::Above);
+    DymboFilter::new(plant).step(&belief, &above).unwrap().1.correction
+}
+
 fn steady_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
     let plant = entry.plant();
     let (kf, dymbo) = (plant.steady_state(1.0).unwrap(), plant.steady_state(FRAC_2_PI).unwrap());
@@ -218,7 +226,7 @@ fn steady_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
         "kf_pred" => kf.predicted_variance,
         "dymbo_filt" => dymbo.filtered_variance,
         "dymbo_pred" => dymbo.predicted_variance,
-        "dymbo_gain" => DymboFilter::new(plant).steady_step().unwrap(),
+        "dymbo_gain" => steady_step(plant),
         "loss_riccati" => plant.loss().unwrap(),
         "dymbo_true_mse" => chain::dymbo_mse(&DymboFilter::new(plant)).unwrap(),
         "loss_true" => chain::true_loss(&plant).unwrap(),
@@ -276,7 +284,7 @@ fn fig5_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
         return Some(variances);
     }
     let transient = chain::first_message_transient(&plant, entry.number("tau"), entry.number("M00"), steps).unwrap();
-    let pick = |step: &TransientStep| {
+    let pick = |step: &chain::TransientStep| {
         if entry.ends(".M") {
             step.filtered_variance
         } else {
@@ -301,7 +309,7 @@ fn prop2_entry(entry: &Entry<'_>) -> Vec<f64> {
 fn sensors_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
     let (plant, k) = (entry.plant(), entry.number("K") as usize);
     Some(match entry.id.rsplit('.').next()? {
-        "seq" => vec![steady::sequential_steady_state(&plant, k).unwrap().filtered_variance],
+        "seq" => vec![chain::sequential_steady_state(&plant, k).unwrap().filtered_variance],
         "par" => {
             let (mse, riccati) =
                 chain::parallel_mse(&ParallelFilter::new(plant, k, CountFusion::Linear).unwrap()).unwrap();

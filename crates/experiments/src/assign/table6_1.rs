@@ -44,8 +44,8 @@ fn row(assign: &'static str, sensors: &CodedSensors, assignment: &[usize]) -> Re
         // Counted from 1, as the thesis does.
         sensors: List(assignment.iter().map(|n| n + 1).collect()),
         approx: quantization_error(sensors.half_width(), sensors.sensors()) + cost,
-        center: sensors.centre_mse(assignment)?,
-        mmse: sensors.mmse(assignment)?,
+        center: sensors.mse(assignment, Estimator::CellCentre)?,
+        mmse: sensors.mse(assignment, Estimator::PosteriorMean)?,
     })
 }
 

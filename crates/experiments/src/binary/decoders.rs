@@ -2,8 +2,10 @@
 
 use super::{ERROR, Scene, each, sweep, swept};
 use crate::prelude::*;
-use fewbits_baselines::binary_patterns::{Decoder, network_rate_distortion, printed_crlb, remote_distortion};
-use fewbits_binary_patterns::bounds::{centralised_bound, optimal_weight_van_trees};
+use fewbits_baselines::binary_patterns::{
+    Decoder, centralised_bound, network_rate_distortion, printed_crlb, remote_distortion,
+};
+use fewbits_binary_patterns::bounds::optimal_weight_van_trees;
 use fewbits_binary_patterns::gray_basis;
 
 pub struct Decoders;

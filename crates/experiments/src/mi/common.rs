@@ -46,7 +46,7 @@ pub(super) fn odd(start: &System, positive: [&[f64]; 2]) -> Result<System, Error
 
 /// The binary symmetric channel of these words at both sensors.
 pub(super) fn over_bsc(system: &System, words: &[u32], crossover: f64) -> Result<System, Error> {
-    let channel = Channel::binary_symmetric_with_gaps(&Labelling::new(words.to_vec())?, crossover)?;
+    let channel = Channel::binary_symmetric(&Labelling::new(words.to_vec())?, crossover)?;
     Ok(system.with_channels(vec![channel; 2])?)
 }
 

@@ -3,7 +3,7 @@
 use super::common::{MI, MSE, Pair, arrived, errors, lloyd_system, odd, scene};
 use crate::prelude::*;
 use fewbits_baselines::quantizer_design as baselines;
-use fewbits_quantizer_design::{Newton, design};
+use fewbits_quantizer_design::{AtSaddle, Newton, design};
 
 parameters! {
     pub struct Parameters {
@@ -77,7 +77,14 @@ impl Figure for Table41 {
                 context.check()?;
                 let greedy = baselines::greedy(&sample, &[0, 1], criterion, &newton)?.swap_remove(1);
                 push(method, "greedy", Pair::of(&greedy.system)?);
-                let nearest = design::joint(&greedy.system, criterion, &Newton::to_nearest_stationary_point())?;
+                let nearest = design::joint(
+                    &greedy.system,
+                    criterion,
+                    &Newton {
+                        at_saddle: AtSaddle::Stay,
+                        ..Newton::default()
+                    },
+                )?;
                 let best = baselines::multi_start(&sample, criterion, p.starts, 1, &newton)?;
                 push(method, if correlated { "symmetric" } else { "joint" }, Pair::joint(&nearest)?);
                 if correlated {

@@ -65,7 +65,9 @@ impl Figure for Table42 {
                 (MSE, "mse-greedy", "mse-greedy-better-first", "mse-joint"),
             ] {
                 push(greedy, Pair::of(&baselines::greedy(&sample, &[0, 1], criterion, &newton)?[1].system)?);
-                let mut quantizers = baselines::greedy(&sample, &[1, 0], criterion, &newton)?[1].quantizers();
+                let mut quantizers = baselines::greedy(&sample, &[1, 0], criterion, &newton)?[1]
+                    .system
+                    .quantizers();
                 quantizers.reverse();
                 push(reversed, Pair::of(&sample.with_quantizers(quantizers)?)?);
                 let best = design::joint(&sample, criterion, &newton)?;

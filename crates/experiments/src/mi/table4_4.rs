@@ -111,7 +111,8 @@ impl Figure for Table44 {
             let start = about(signal, 1.0)?;
             let all = System::identical(scene(signal, p.sensors)?, start.clone())?;
             let one = System::identical(scene(signal, 1)?, start.clone())?;
-            let joint = |system, criterion| Ok::<_, Error>(design::joint(system, criterion, &newton)?.quantizers());
+            let joint =
+                |system, criterion| Ok::<_, Error>(design::joint(system, criterion, &newton)?.system.quantizers());
             let separated = |d| Ok::<_, Error>(baselines::separate(d, signal, 1.0, &start, &ideal, &newton)?.0);
             let best = joint(&all, PE)?.remove(0);
             let common = [

@@ -227,7 +227,7 @@ fn a_belief_from_leader_to_leader() {
             let mut rng = Stream::new(9).named("lead").indexed(k as u64 + 1).rng();
             let reading = &readings[k][leaders[k] as usize];
             let (handover, _) = filter.step(&mut rng, &known, &dynamics, reading).unwrap();
-            bits.push(handover.bits().unwrap() as u64);
+            bits.push(handover.message().unwrap().bits() as u64);
             known = handover.into_mixture();
             vec![known.mean()[0]]
         })

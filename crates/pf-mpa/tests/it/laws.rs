@@ -10,7 +10,7 @@ use fewbits_filters::{BootstrapFilter, MomentFilter, ResamplingRule, StateFilter
 use fewbits_models::{PLANE_POSITION, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference, RangeSensor};
-use fewbits_quantizers::{Labelling, Symbol};
+use fewbits_quantizers::Symbol;
 use nalgebra::{Vector1, Vector2, Vector4};
 
 fn noises(scale: f64) -> [RangeNoise; 3] {
@@ -33,9 +33,7 @@ fn schemes_obey_their_laws() {
     for scale in [1e-4, 1.0, 1e4] {
         for noise in noises(scale) {
             for levels in [2, 3, 4, 16] {
-                let range = QuantizedRange::new(levels, noise)
-                    .unwrap()
-                    .with_labelling(Labelling::gray(levels).unwrap());
+                let range = QuantizedRange::new(levels, noise).unwrap();
                 let at = [-2.0, 0.0, 1e-3, 3.0, 5.2, 7.0, 90.0].map(|m| Vector1::new(m * scale));
                 let sources = [Stream::new(1).rng(), Stream::new(2).rng()];
                 scheme::deterministic(&range, &reference(scale), &sources, &at).unwrap();

@@ -16,17 +16,16 @@ use crate::error::{Error, refuse};
 use crate::observation_model::{Noise, Prior};
 
 /// `D(R) = s_x^2 - s_x^4 / (s_x^2 + s^2) (1 - 2^{-2R})` (2.15): the least squared error in `X` from `R` bits about the samples of sensors
-/// that are encoded together. Independent noises combine to `1 / s^2 = sum_n 1 / s_n^2`.
+/// that are encoded together. Their noises combine to `1 / s^2 = 1' Sigma^-1 1`.
 ///
 /// # Errors
-/// If the prior is not Gaussian, the noise is correlated, or `bits` is negative or not finite.
+/// If the prior is not Gaussian, or `bits` is negative or not finite.
 pub fn remote_distortion_rate(prior: &Prior, noise: &Noise, bits: f64) -> Result<f64, Error> {
-    let sx2 = prior_variance(prior)?;
-    let precision: f64 = independent_variances(noise)?.iter().map(|s2| 1.0 / s2).sum();
-    let s2 = fewbits_numerics::error::positive("noise variance", 1.0 / precision)?;
+    let prior = prior_variance(prior)?;
     let bits = fewbits_numerics::error::non_negative("bits", bits)?;
-    // The error from the noise alone plus the remaining part: no difference, so no digits are lost.
-    Ok(sx2 / (sx2 + s2) * (s2 + sx2 * (-2.0 * bits).exp2()))
+    // The error from the noise alone plus the remaining part, which loses no digits.
+    let left = 1.0 / (1.0 / prior + noise.precision_of_mean());
+    Ok(left + (prior - left) * (-2.0 * bits).exp2())
 }
 
 /// Variance of a Gaussian prior.
@@ -83,7 +82,9 @@ mod tests {
     fn bad_rates_are_refused() {
         assert!(remote_distortion_rate(&unit(), &noise_of(&[1.0]), -1.0).is_err());
         assert!(remote_distortion_rate(&Prior::binary(1.0, 0.5).unwrap(), &noise_of(&[1.0]), 1.0).is_err());
+        // The mean of two samples has noise of variance (1 + .5) / 2.
         let correlated = Noise::equicorrelated_with_deviations(&[1.0; 2], 0.5).unwrap();
-        assert!(remote_distortion_rate(&unit(), &correlated, 1.0).is_err());
+        let found = remote_distortion_rate(&unit(), &correlated, 1.0).unwrap();
+        assert!((found - remote_distortion_rate(&unit(), &noise_of(&[0.75]), 1.0).unwrap()).abs() < 1e-15);
     }
 }

@@ -29,7 +29,7 @@ pub fn unquantised(model: &ObservationModel, criterion: Criterion) -> Result<Opt
         return Ok(None);
     }
     // The weighted mean of all samples is a sufficient statistic, so one integral over it is enough.
-    let (step, mean) = (STEP * deviation, model.sample_mean());
+    let (step, mean) = (STEP * deviation, model.prior().mean());
     let (mut explained, mut information, mut correct) = (0.0, 0.0, 0.0);
     for i in 0..=count as usize {
         let s = low - REACH * deviation + i as f64 * step;

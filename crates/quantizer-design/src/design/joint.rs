@@ -4,10 +4,9 @@ use super::apart::{Opposed, halved, opposed};
 use crate::criterion::Criterion;
 use crate::deadline::Deadline;
 use crate::error::Error;
-use crate::newton::{AtSaddle, Certificate, Newton, Objective, ascend, climb};
+use crate::newton::{AtSaddle, Certificate, Newton, Objective, climb};
 use crate::problem::Problem;
 use crate::system::System;
-use fewbits_quantizers::Quantizer;
 use serde::{Deserialize, Serialize};
 
 /// Length of a step away from a saddle, in standard deviations of the sample.
@@ -27,13 +26,11 @@ pub enum Scope {
 }
 
 /// A stationary point of a criterion.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Design {
     /// The system with its designed quantizers.
     pub system: System,
     /// Value of the criterion: nats, squared units, or a probability.
-    #[serde(deserialize_with = "crate::error::stored_size")]
     pub value: f64,
     /// Largest eigenvalue of the Hessian of the criterion (signed so that larger is better): not above 0 at a local optimum.
     pub largest_curvature: f64,
@@ -45,18 +42,6 @@ pub struct Design {
     pub iterations: usize,
     /// Number of evaluations of the criterion, with or without derivatives.
     pub evaluations: usize,
-}
-
-impl Design {
-    /// The designed quantizers, group after group.
-    pub fn quantizers(&self) -> Vec<Quantizer> {
-        self.system.quantizers()
-    }
-
-    /// Whether the point is a saddle: some change of the breakpoints improves it to second order.
-    pub fn is_saddle(&self) -> bool {
-        self.certificate == Certificate::Saddle
-    }
 }
 
 /// The stationary point of `criterion` over the breakpoints of all groups (4.2), reached from the system's own quantizers.
@@ -81,7 +66,7 @@ pub fn improved(system: &System, criterion: Criterion, newton: &Newton) -> Resul
     let all: Vec<usize> = (0..system.groups().len()).collect();
     let problem = Problem::new(system, criterion, &all)?;
     let mut point = problem.start();
-    match ascend(&problem, &mut point, breakpoint_scale(system, &all), newton, Deadline::NEVER) {
+    match climb(&problem, &mut point, breakpoint_scale(system, &all), newton, Deadline::NEVER) {
         Ok(_) | Err(Error::NotConverged { .. }) => problem.system_at(&point),
         Err(error) => Err(error),
     }
@@ -97,7 +82,7 @@ pub(crate) fn joint_until(
     let every = |system: &System| (0..system.groups().len()).collect::<Vec<_>>();
     let (mut design, mut steepest) = optimise_until(system, &every(system), criterion, newton, deadline)?;
     while newton.at_saddle == AtSaddle::StepOff
-        && design.is_saddle()
+        && design.certificate == Certificate::Saddle
         && let Some((group, opposed)) = steepest.filter(|(_, opposed)| opposed.curvature > 0.0)
     {
         let length = STEP_OFF * breakpoint_scale(&design.system, &[group]);
@@ -132,7 +117,7 @@ fn optimise_until(
 ) -> Result<(Design, Option<(usize, Opposed)>), Error> {
     let problem = Problem::new(system, criterion, active)?;
     let scale = breakpoint_scale(system, active);
-    let found = climb(&problem, &problem.start(), scale, newton, deadline)?;
+    let found = climb(&problem, &mut problem.start(), scale, newton, deadline)?;
     if let Some((quantizer, cell, probability)) = problem.rarest_cell(&found.point)
         && probability < VANISHED
     {

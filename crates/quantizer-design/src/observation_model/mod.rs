@@ -206,20 +206,9 @@ impl ObservationModel {
         &self.weights
     }
 
-    /// Prior variance.
-    pub fn prior_variance(&self) -> f64 {
-        let spread = self.prior.deviation();
-        spread * spread
-    }
-
     /// Standard deviation of sensor `n`'s sample.
     pub fn sample_deviation(&self, n: usize) -> f64 {
         self.prior.deviation().hypot(self.noise.deviation(n))
-    }
-
-    /// Mean of every sample, equal to that of the prior.
-    pub fn sample_mean(&self) -> f64 {
-        self.mean
     }
 
     /// The same prior with only some of the sensors.
@@ -283,7 +272,7 @@ fn on_one_axis(
     let half_width = (mean - low).max(high - mean) + reach;
     let two_axes = values.len() as f64 * 4.0 * FACTOR_REACH;
     let unequal = noise.loadings.iter().any(|a| *a != shared);
-    if unequal || prior.is_discrete() || 2.0 * half_width / step > two_axes {
+    if unequal || prior.points().is_some() || 2.0 * half_width / step > two_axes {
         return Ok(None);
     }
     let offsets = grid(half_width, step)?;

@@ -248,11 +248,6 @@ impl Prior {
         }
     }
 
-    /// Whether the unknown is one of finitely many values.
-    pub fn is_discrete(&self) -> bool {
-        matches!(self.shape, Shape::Discrete { .. })
-    }
-
     /// Whether the unknown is normal.
     pub fn is_normal(&self) -> bool {
         matches!(self.shape, Shape::Gaussian { .. })

@@ -28,6 +28,6 @@ mod sums;
 mod table;
 
 pub(crate) use sums::moments_until;
-pub use sums::{explained, for_each, for_each_log, moments};
+pub use sums::{IMPOSSIBLE, explained, for_each, for_each_log, moments};
 pub use table::{Feature, Table, cell_probabilities, dot};
 pub(crate) use table::{SETTLED, add_scaled, intervals};

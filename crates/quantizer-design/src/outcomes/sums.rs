@@ -6,7 +6,7 @@ use std::borrow::Borrow;
 use std::ops::ControlFlow;
 
 /// Outcomes of smaller probability are left out of sums of quotients; their contribution to any error is below `1e-280`.
-const IMPOSSIBLE: f64 = 1e-290;
+pub const IMPOSSIBLE: f64 = 1e-290;
 
 /// The part `moment^2 / mass` of the second moment that an outcome explains, given its probability and first moment.
 #[inline]

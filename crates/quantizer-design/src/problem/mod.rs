@@ -17,10 +17,9 @@ mod cells;
 mod second_order;
 
 use crate::criterion::{Criterion, Scored};
-use crate::derivatives::Derivatives;
 use crate::error::Error;
 use crate::law::{Active, Slots, negative_entropy, sums};
-use crate::newton::{Objective, split};
+use crate::newton::{Derivatives, Objective, split};
 use crate::outcomes::axis::Axis;
 use crate::outcomes::{Table, dot, moments};
 use crate::system::System;
@@ -61,7 +60,7 @@ impl Objective for Problem<'_> {
 
     /// Numbers of breakpoints of the active groups.
     fn blocks(&self) -> Vec<usize> {
-        self.active.iter().map(Active::parameters).collect()
+        self.active.iter().map(|a| a.exchange.len()).collect()
     }
 
     fn unit(&self, value: f64) -> f64 {
@@ -188,6 +187,35 @@ impl<'a> Problem<'a> {
             outer: self.fixed_outcomes() * sizes.clone().take(g).product::<usize>(),
             inner: sizes.skip(g + 1).product::<usize>() * width,
         }
+    }
+}
+
+impl System {
+    /// Value of a criterion: nats, squared units of the unknown, or a probability. The quadrature error is about 1e-12.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`] if there are more outcomes than the limit; [`Error::Argument`] for a Bayes error under a continuous prior.
+    pub fn value(&self, criterion: Criterion) -> Result<f64, Error> {
+        let problem = Problem::new(self, criterion, &[])?;
+        Ok((problem.value(&[]) + problem.offset()) * criterion.sense())
+    }
+
+    /// Value, gradient and Hessian of a criterion with respect to all breakpoints, group by group.
+    ///
+    /// The Bayes error is smooth except at breakpoints where a decision changes; its derivatives are those of the smooth piece.
+    ///
+    /// # Errors
+    /// As [`System::value`].
+    pub fn derivatives(&self, criterion: Criterion) -> Result<Derivatives, Error> {
+        let all: Vec<usize> = (0..self.groups().len()).collect();
+        let problem = Problem::new(self, criterion, &all)?;
+        let sense = criterion.sense();
+        let found = problem.derivatives(&problem.start());
+        Ok(Derivatives {
+            value: (found.value + problem.offset()) * sense,
+            gradient: found.gradient * sense,
+            hessian: found.hessian * sense,
+        })
     }
 }
 

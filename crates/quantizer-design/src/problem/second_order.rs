@@ -2,8 +2,8 @@
 
 use super::{Problem, Slot};
 use crate::criterion::LOG_FLOOR;
-use crate::derivatives::Derivatives;
 use crate::law::Active;
+use crate::newton::Derivatives;
 use crate::outcomes::axis::{Axis, reduce, scatter, slice};
 use crate::outcomes::{Table, dot};
 use nalgebra::{DMatrix, DVector};
@@ -50,7 +50,7 @@ impl Problem<'_> {
 
         let mut changes = Vec::with_capacity(total);
         for (g, a) in self.active.iter().enumerate() {
-            let n = a.parameters();
+            let n = a.exchange.len();
             let (first, bend) =
                 (self.node_sums(&slots, &[(g, Slot::First)]), self.node_sums(&slots, &[(g, Slot::Slope)]));
             let second = if a.compositions.total >= 2 {
@@ -95,9 +95,9 @@ impl Problem<'_> {
                         ..shrunk
                     };
                     let below_h = other.compositions.len_below(1);
-                    for j in 0..other.parameters() {
+                    for j in 0..other.exchange.len() {
                         let both = reduce(&reduced, shrunk, &other.compositions, 0, &other.exchange[j]);
-                        let of_j = slice(crossed, expanded, other.parameters(), below_h, j);
+                        let of_j = slice(crossed, expanded, other.exchange.len(), below_h, j);
                         let beside = Axis {
                             inner: axis.inner / other.compositions.len() * below_h,
                             ..axis
@@ -138,7 +138,7 @@ impl Problem<'_> {
         (densities, slopes): &(Table, Table),
     ) -> Derivatives {
         let mass = &self.system.model().mass.weights;
-        let (n, nodes) = (a.parameters(), mass.len());
+        let (n, nodes) = (a.exchange.len(), mass.len());
         let sensors = a.group.sensors.len() as f64;
         let mut gradient = DVector::zeros(n);
         let mut hessian = DMatrix::zeros(n, n);

@@ -4,6 +4,7 @@ use super::adc::Rounded;
 use super::additive::AdditiveDecoder;
 use super::participant::SensorDesign;
 use super::solution::Solution;
+use crate::criterion::Criterion;
 use crate::error::{Error, refuse};
 use fewbits_numerics::error::entries;
 use serde_json::json;
@@ -105,10 +106,10 @@ impl Export {
     /// Mean squared error with the decoder of this export.
     ///
     /// # Errors
-    /// As [`Solution::mean_squared_error`].
+    /// As [`System::value`](crate::System::value).
     pub fn mean_squared_error(&self) -> Result<f64, Error> {
         match &self.decoder {
-            Decoder::Joint { .. } => self.solution.mean_squared_error(),
+            Decoder::Joint { .. } => self.solution.system().value(Criterion::MeanSquaredError),
             Decoder::Additive(decoder) => Ok(decoder.mean_squared_error),
         }
     }
@@ -138,7 +139,7 @@ impl Export {
     /// The design as JSON, in the form of [`JSON_SCHEMA`].
     ///
     /// # Errors
-    /// As [`Solution::mean_squared_error`].
+    /// As [`System::value`](crate::System::value).
     pub fn to_json(&self) -> Result<String, Error> {
         let solution = &self.solution;
         let sensor = |(n, s): (usize, &SensorDesign)| {

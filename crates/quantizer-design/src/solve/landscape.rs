@@ -66,7 +66,7 @@ pub(super) struct Sample {
 
 impl Sample {
     fn of(model: &ObservationModel, sensor: usize) -> Self {
-        let (mean, deviation) = (model.sample_mean(), model.sample_deviation(sensor));
+        let (mean, deviation) = (model.prior().mean(), model.sample_deviation(sensor));
         let place = |i: usize| mean + REACH * deviation * (2.0 * i as f64 / PLACES as f64 - 1.0);
         let places: Vec<f64> = (0..=PLACES).map(place).collect();
         let noise = model.noise().deviation(sensor);

@@ -6,7 +6,7 @@ use crate::observation_model::ObservationModel;
 use crate::system::{SensorGroup, System};
 use fewbits_core::Link;
 use fewbits_numerics::error::entries;
-use fewbits_quantizers::quantizer::{cell_of, check_increasing};
+use fewbits_quantizers::quantizer::check_increasing;
 use fewbits_quantizers::{Channel, Quantizer, lloyd_max};
 use serde::{Deserialize, Serialize};
 
@@ -27,14 +27,6 @@ pub struct SensorDesign {
 }
 
 impl SensorDesign {
-    /// The word for a sample.
-    ///
-    /// # Errors
-    /// If the sample is NaN.
-    pub fn encode(&self, sample: f64) -> Result<usize, Error> {
-        Ok(self.words[cell_of(&self.breakpoints, sample)?])
-    }
-
     /// Number of symbols that can be received: all words, and one more after them, "nothing", if a word may be missing.
     pub fn symbols(&self) -> usize {
         (1 << self.bits) + usize::from(missing(&self.link) > 0.0)
@@ -62,8 +54,13 @@ impl SensorDesign {
         }
     }
 
+    /// The channels of several sensors.
+    pub(super) fn laws(sensors: &[Self]) -> Result<Vec<Channel>, Error> {
+        sensors.iter().map(Self::law).collect()
+    }
+
     /// The channel from words to received symbols: the words, and one more symbol "missing" if the link can lose words.
-    pub(super) fn law(&self) -> Result<Channel, Error> {
+    fn law(&self) -> Result<Channel, Error> {
         let words = 1u64 << self.bits;
         let received = |t: u64| {
             let arrives = |w: u64| self.link.arrival() * self.link.word_probability(w, t, self.bits);
@@ -134,7 +131,7 @@ pub(super) fn plain(
 ) -> Result<Vec<WordedCells>, Error> {
     let of = |(n, participant): (usize, &SensorDesign)| {
         let levels = 1usize << participant.bits;
-        let lloyd = lloyd_max::gaussian(levels)?.affine(model.sample_mean(), model.sample_deviation(n))?;
+        let lloyd = lloyd_max::gaussian(levels)?.affine(model.prior().mean(), model.sample_deviation(n))?;
         Ok(WordedCells {
             breakpoints: lloyd.breakpoints().to_vec(),
             words: (0..levels).map(word).collect(),
@@ -160,10 +157,7 @@ pub(super) fn system_of(
     cells: &[WordedCells],
     apart: bool,
 ) -> Result<System, Error> {
-    let laws = participants
-        .iter()
-        .map(SensorDesign::law)
-        .collect::<Result<Vec<_>, _>>()?;
+    let laws = SensorDesign::laws(participants)?;
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for n in 0..participants.len() {
         // Sensors of equal design, link and noise form a group, whose outcomes are counts.
@@ -202,7 +196,7 @@ fn parts_of(model: &ObservationModel, law: &Channel, cells: &WordedCells) -> Res
     // A quantizer has at least two cells: a sensor with one cell gets two with the same word.
     if used.len() == 1 {
         used.push(used[0]);
-        (labels, breakpoints) = (vec![0, 1], vec![model.sample_mean()]);
+        (labels, breakpoints) = (vec![0, 1], vec![model.prior().mean()]);
     }
     let rows = (0..law.outputs()).map(|t| used.iter().map(|w| law.probability(t, *w)).collect());
     let rows: Vec<Vec<f64>> = rows.collect();

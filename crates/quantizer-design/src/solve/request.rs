@@ -104,7 +104,7 @@ impl Request<'_> {
     /// # Errors
     /// If the prior is not discrete.
     pub fn detection(model: ObservationModel, bits: BitBudget, link: Link) -> Result<Self, Error> {
-        if !model.prior().is_discrete() {
+        if model.prior().points().is_none() {
             return refuse("prior", "a continuous prior", "a discrete prior: the hypotheses");
         }
         Ok(Self {

@@ -165,11 +165,7 @@ pub fn minimax(
         .into_iter()
         .map(|[mean, deviation, noise]| varied(&centre, mean, 1.0 + deviation, 1.0 + noise))
         .collect::<Result<Vec<_>, _>>()?;
-    let laws = nominal
-        .sensors()
-        .iter()
-        .map(SensorDesign::law)
-        .collect::<Result<Vec<_>, _>>()?;
+    let laws = SensorDesign::laws(nominal.sensors())?;
     let mut weights = vec![1.0 / models.len() as f64; models.len()];
     let weighted: Vec<(f64, &ObservationModel)> = weights.iter().copied().zip(&models).collect();
     let mut landscape = Landscape::new(&weighted, Criterion::MeanSquaredError, laws, Resolution::COARSE)?;

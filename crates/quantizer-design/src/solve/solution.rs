@@ -12,6 +12,7 @@ use crate::observation_model::ObservationModel;
 use crate::system::System;
 use fewbits_core::Link;
 use fewbits_numerics::error::entries;
+use fewbits_quantizers::quantizer::cell_of;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
@@ -158,19 +159,11 @@ impl Solution {
         &self.system
     }
 
-    /// `E (X - E[X | T])^2`, in squared units.
-    ///
-    /// # Errors
-    /// As [`System::value`].
-    pub fn mean_squared_error(&self) -> Result<f64, Error> {
-        self.system.value(Criterion::MeanSquaredError)
-    }
-
     /// Relative distance of the value from the bound; 0 is optimal. `None` without a bound, and of a value above a bound of 0.
     pub fn gap(&self) -> Option<f64> {
         let bound = self.bound?.value;
         let unit = match self.criterion {
-            Criterion::MeanSquaredError => self.system.model().prior_variance(),
+            Criterion::MeanSquaredError => self.system.model().prior().deviation().powi(2),
             Criterion::MutualInformation | Criterion::BayesError => 1.0,
         };
         let apart = (self.value - bound).abs();
@@ -189,7 +182,7 @@ impl Solution {
         self.sensors
             .iter()
             .zip(samples)
-            .map(|(sensor, y)| sensor.encode(*y))
+            .map(|(sensor, y)| Ok(sensor.words[cell_of(&sensor.breakpoints, *y)?]))
             .collect()
     }
 
@@ -283,12 +276,14 @@ fn tightest_bound(system: &System, sensors: &[SensorDesign], criterion: Criterio
     match criterion {
         Criterion::MutualInformation => found.push((total * std::f64::consts::LN_2, BoundKind::Capacity)),
         Criterion::MeanSquaredError if model.prior().is_normal() => {
-            let prior = model.prior_variance();
-            let left = 1.0 / (1.0 / prior + model.noise().precision_of_mean());
-            found.push((left + (prior - left) * (-2.0 * total).exp2(), BoundKind::Together));
+            let together = bounds::remote_distortion_rate(model.prior(), model.noise(), total);
+            found.extend(together.ok().map(|bound| (bound, BoundKind::Together)));
             // No CEO bound for correlated noise, too many sensors, or if it does not converge.
             let ceo = bounds::ceo(model.prior(), model.noise(), &capacities);
-            found.extend(ceo.ok().map(|bound| (bound.lower(), BoundKind::Ceo)));
+            found.extend(
+                ceo.ok()
+                    .map(|bound| (bound.distortion * (-bound.gap).exp(), BoundKind::Ceo)),
+            );
         }
         _ => {}
     }

@@ -61,10 +61,7 @@ pub(super) struct Search<'a> {
 impl Search<'_> {
     pub(super) fn run(&self, control: &mut Control<'_>) -> Result<Searched, Error> {
         let (model, participants) = (self.model, self.participants);
-        let laws = participants
-            .iter()
-            .map(SensorDesign::law)
-            .collect::<Result<Vec<_>, _>>()?;
+        let laws = SensorDesign::laws(participants)?;
         let singles = self.single_sensors(&laws, control)?;
         let mut first = singles.iter().map(|s| s[0].clone()).collect::<Vec<_>>();
         let outcomes: f64 = laws.iter().map(|l| l.outputs() as f64).product();

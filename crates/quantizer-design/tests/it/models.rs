@@ -90,7 +90,7 @@ impl Task {
                     Labelling::natural(levels)?
                 };
                 channels.push(Channel::binary_symmetric(&words, self.crossover)?);
-                let (mean, deviation) = (self.model.sample_mean(), self.model.sample_deviation(n));
+                let (mean, deviation) = (self.model.prior().mean(), self.model.sample_deviation(n));
                 let lloyd = lloyd_max::gaussian(levels)?.affine(mean, deviation)?;
                 let mut b = lloyd.breakpoints().to_vec();
                 if start > 1 {

@@ -58,7 +58,7 @@ proptest! {
             prop_assert!(prior.mean().is_finite() && !prior.deviation().is_nan(), "{:?}", prior);
         }
         for model in models(&x) {
-            prop_assert!(model.prior_variance() >= 0.0 && model.sample_mean().is_finite() && model.sample_deviation(0) >= 0.0, "{:?}", model);
+            prop_assert!(model.prior().deviation().powi(2) >= 0.0 && model.prior().mean().is_finite() && model.sample_deviation(0) >= 0.0, "{:?}", model);
             let _ = model.subset(&[levels]);
             for criterion in [Criterion::MutualInformation, Criterion::MeanSquaredError] {
                 if let Ok(Some(bound)) = bounds::unquantised(&model, criterion) {
@@ -94,7 +94,7 @@ proptest! {
             for criterion in [Criterion::MutualInformation, Criterion::MeanSquaredError] {
                 if let Ok(found) = design::joint(&system, criterion, &Newton::default()) {
                     prop_assert!(found.value.is_finite(), "{:?}: {:?}", system, found.value);
-                    prop_assert!(found.quantizers().iter().flat_map(|q| q.breakpoints().to_vec()).all(|b| b.is_finite()));
+                    prop_assert!(found.system.quantizers().iter().flat_map(|q| q.breakpoints().to_vec()).all(|b| b.is_finite()));
                 }
             }
         }

@@ -89,7 +89,7 @@ fn a_symbol_through_any_channel_is_a_lawful_factor() {
     let channels = [
         Channel::symbol_erasure(4, 0.2).unwrap(),
         Channel::pulse_amplitude(4, 10.0).unwrap(),
-        Channel::symmetric(4, 0.1).unwrap(),
+        Channel::binary_symmetric(&Labelling::gray(4).unwrap(), 0.1).unwrap(),
     ];
     let prior = Gaussian::scalar(0.2, 1.5).unwrap();
     for channel in channels {
@@ -109,10 +109,9 @@ fn a_failed_measurement_is_an_error_and_not_a_level() {
             .encode(&mut rng, &mut (), &Scalar::from([f64::NAN]), &())
             .is_err()
     );
-    assert!(QuantizingSensor::with_variance(sensor.quantizer().clone(), Labelling::gray(8).unwrap(), 1.0).is_err());
-    assert!(
-        QuantizingSensor::with_variance(sensor.quantizer().clone(), Labelling::gray(4).unwrap(), f64::NAN).is_err()
-    );
+    let quantizer = || Quantizer::symmetric(1.0).unwrap();
+    assert!(QuantizingSensor::with_variance(quantizer(), Labelling::gray(8).unwrap(), 1.0).is_err());
+    assert!(QuantizingSensor::with_variance(quantizer(), Labelling::gray(4).unwrap(), f64::NAN).is_err());
     let json = serde_json::to_string(sensor).unwrap();
     assert_eq!(&serde_json::from_str::<QuantizingSensor>(&json).unwrap(), sensor);
 }

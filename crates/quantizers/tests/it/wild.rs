@@ -35,7 +35,7 @@ proptest! {
             if let Ok(moved) = q.affine(x[6], x[7]) {
                 prop_assert!(moved.breakpoints().iter().all(|b| b.is_finite()), "{:?}", moved);
             }
-            let channel = Channel::symmetric(q.levels(), x[6]);
+            let channel = Channel::pulse_amplitude(q.levels(), x[6]);
             if let Some(factor) = channel.ok().and_then(|channel| q.factor(count, &channel, x[5]).ok()) {
                 let log = factor.log_likelihood(&[x[4]].into());
                 prop_assert!(!x[4].is_finite() || !log.is_nan(), "{:?} {}", factor, x[4]);
@@ -57,13 +57,11 @@ proptest! {
     fn channels_are_distributions(x in prop::array::uniform8(wild()), levels in 0..9_usize) {
         let mut all: Vec<Channel> = Vec::new();
         all.extend(Channel::ideal(levels));
-        all.extend(Channel::symmetric(levels, x[0]));
         all.extend(Channel::symbol_erasure(levels, x[0]));
         all.extend(Channel::pulse_amplitude(levels, x[0]));
         all.extend(Channel::from_rows(&[vec![x[0], x[1]], vec![x[2], x[3]]]));
         if let Ok(labelling) = Labelling::gray(levels) {
             all.extend(Channel::binary_symmetric(&labelling, x[1]));
-            all.extend(Channel::binary_symmetric_with_gaps(&labelling, x[1]));
         }
         for channel in &all {
             for input in 0..channel.inputs() {

@@ -54,8 +54,8 @@ fn table_6_1() {
         }
         let ours = match parts[2] {
             "approx" => quantization_error(1.0, 8) + costs.cost(&assignment).unwrap(),
-            "center" => sensors.centre_mse(&assignment).unwrap(),
-            "mmse" => sensors.mmse(&assignment).unwrap(),
+            "center" => sensors.mse(&assignment, Estimator::CellCentre).unwrap(),
+            "mmse" => sensors.mse(&assignment, Estimator::PosteriorMean).unwrap(),
             other => panic!("unknown error {other}"),
         };
         check(e, ours).unwrap();

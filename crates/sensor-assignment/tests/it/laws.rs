@@ -28,8 +28,8 @@ proptest! {
             prop_assert!(ours <= all.largest * (1.0 + 1e-9));
         }
         // The posterior mean beats the centre decoder and obeys the Bayesian bound.
-        let mmse = sensors.mmse(&found).unwrap();
-        prop_assert!(mmse <= sensors.centre_mse(&found).unwrap() * (1.0 + 1e-12));
+        let mmse = sensors.mse(&found, Estimator::PosteriorMean).unwrap();
+        prop_assert!(mmse <= sensors.mse(&found, Estimator::CellCentre).unwrap() * (1.0 + 1e-12));
         prop_assert!(optimal_weight_van_trees(&sensors.bank(&found).unwrap()).unwrap() <= mmse * (1.0 + 1e-9));
     }
 
@@ -65,7 +65,7 @@ fn exchanges_close_the_gap_of_the_linear_assignment() {
         let sensors = CodedSensors::with_variances(1.0, &v).unwrap();
         let found = pair_costs(&sensors).solve();
         let centre = all_errors(&sensors, Estimator::CellCentre).unwrap();
-        assert!(sensors.centre_mse(&found).unwrap() <= 1.09 * centre.least);
+        assert!(sensors.mse(&found, Estimator::CellCentre).unwrap() <= 1.09 * centre.least);
         let mmse = all_errors(&sensors, Estimator::PosteriorMean).unwrap();
         let swapped = exchange(&sensors, &found, Estimator::PosteriorMean).unwrap();
         assert!((swapped.error - mmse.least).abs() <= 1e-9 * mmse.least);

@@ -39,7 +39,7 @@ proptest! {
     #[test]
     fn errors_of_assignments_are_numbers_or_refused(x in prop::array::uniform4(wild()), choice in prop::collection::vec(0..3_usize, 2)) {
         let Ok(sensors) = CodedSensors::with_deviations(x[0], &x[1..3]) else { return Ok(()) };
-        for error in [sensors.mmse(&choice), sensors.centre_mse(&choice), sensors.mse(&choice, Estimator::PosteriorMean)].into_iter().flatten() {
+        for error in [Estimator::PosteriorMean, Estimator::CellCentre].map(|estimator| sensors.mse(&choice, estimator)).into_iter().flatten() {
             prop_assert!(error.is_finite() && error >= 0.0, "{:?}: {}", sensors, error);
         }
         if let Ok(estimate) = sensors.decode(&choice, &[Observation::Nothing, Observation::Lost]) {

@@ -1,17 +1,35 @@
 //! Several sensors with their quantizers and channels, and one fusion centre.
 
-mod group;
-
-pub use group::SensorGroup;
-
 use crate::error::{Error, refuse};
 use crate::observation_model::ObservationModel;
 use crate::outcomes::counts::count;
 use fewbits_numerics::error::{at_least_one, entries};
-use fewbits_quantizers::Channel;
-use fewbits_quantizers::Quantizer;
-use fewbits_quantizers::lloyd_max;
+use fewbits_quantizers::{Channel, Quantizer, lloyd_max};
 use serde::{Deserialize, Serialize};
+
+/// Sensors of equal noise that share a quantizer design and a channel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorGroup {
+    /// The quantizer of each sensor.
+    pub quantizer: Quantizer,
+    /// The channel behind each sensor, of which each has its own copy.
+    pub channel: Channel,
+    /// Indices of the sensors in the model.
+    pub sensors: Vec<usize>,
+}
+
+impl SensorGroup {
+    /// `P(received = t | sample in cell i)`.
+    pub(crate) fn cell_transition(&self, t: usize, cell: usize) -> f64 {
+        self.channel.probability(t, self.quantizer.labels()[cell])
+    }
+
+    /// Number of different joint reports of the group, if only the counts of symbols matter.
+    pub(crate) fn outcomes(&self) -> u64 {
+        count(self.sensors.len(), self.channel.outputs())
+    }
+}
 
 /// Default for the largest number of joint outcomes that a computation may enumerate.
 pub(crate) const OUTCOME_LIMIT: u64 = 1 << 20;
@@ -141,7 +159,7 @@ impl System {
     pub fn lloyd_max(model: ObservationModel, levels: usize) -> Result<Self, Error> {
         let standard = lloyd_max::gaussian(levels)?;
         let quantizers = (0..model.sensors())
-            .map(|n| Ok(Quantizer::from(&standard.affine(model.sample_mean(), model.sample_deviation(n))?)))
+            .map(|n| Ok(Quantizer::from(&standard.affine(model.prior().mean(), model.sample_deviation(n))?)))
             .collect::<Result<Vec<_>, Error>>()?;
         Self::ideal(model, quantizers)
     }
@@ -188,7 +206,7 @@ impl System {
     }
 
     /// Number of joint outcomes, if only the counts of symbols matter within a group.
-    pub fn outcomes(&self) -> u64 {
+    pub(crate) fn outcomes(&self) -> u64 {
         self.groups.iter().fold(1, |n: u64, g| n.saturating_mul(g.outcomes()))
     }
 

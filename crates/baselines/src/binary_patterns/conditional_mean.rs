@@ -1,8 +1,7 @@
 //! A source observed in noise: the conditional mean, and integrals over the observation.
 
-use crate::Error;
-use crate::Source;
-use crate::observation::source::Kind;
+use fewbits_binary_patterns::engine::Kind;
+use fewbits_binary_patterns::{Error, Source};
 use fewbits_numerics::error::positive;
 use fewbits_numerics::normal::{interval, pdf, truncated_moments};
 use fewbits_numerics::quadrature::gauss_legendre;
@@ -37,8 +36,7 @@ impl ConditionalMean {
     }
 
     /// Density of the measurement.
-    #[doc(hidden)]
-    pub fn measurement_density(&self, y: f64) -> f64 {
+    pub(super) fn measurement_density(&self, y: f64) -> f64 {
         match self.source.kind() {
             Kind::Uniform { half_width: v } if v < FAINT * self.noise_deviation => {
                 pdf(y / self.noise_deviation) / self.noise_deviation
@@ -54,7 +52,7 @@ impl ConditionalMean {
     }
 
     /// `(E[X|y], Var[X|y])`: for a uniform source the moments of a normal truncated to `[-V, V]`.
-    pub(crate) fn moments(&self, y: f64) -> (f64, f64) {
+    pub(super) fn moments(&self, y: f64) -> (f64, f64) {
         let s = self.noise_deviation;
         match self.source.kind() {
             // To first order in `v/s`; the ends of the truncation would differ only by rounding.
@@ -72,8 +70,7 @@ impl ConditionalMean {
     }
 
     /// Half the width of the interval outside which the density of the measurement is negligible.
-    #[doc(hidden)]
-    pub fn measurement_reach(&self) -> f64 {
+    pub(super) fn measurement_reach(&self) -> f64 {
         match self.source.kind() {
             Kind::Uniform { half_width } => half_width + REACH * self.noise_deviation,
             Kind::Gaussian { deviation } => REACH * deviation.hypot(self.noise_deviation),
@@ -81,8 +78,7 @@ impl ConditionalMean {
     }
 
     /// `int_{from}^{to} p_Y(y) f(y, E[X|y], Var[X|y]) dy`.
-    #[doc(hidden)]
-    pub fn integrate(&self, from: f64, to: f64, mut f: impl FnMut(f64, f64, f64) -> f64) -> f64 {
+    pub(super) fn integrate(&self, from: f64, to: f64, mut f: impl FnMut(f64, f64, f64) -> f64) -> f64 {
         let (width, corner) = match self.source.kind() {
             Kind::Uniform { half_width } => (self.noise_deviation, half_width - REACH * self.noise_deviation),
             Kind::Gaussian { deviation } => (deviation.hypot(self.noise_deviation), 0.0),

@@ -1,4 +1,4 @@
-//! The van Trees (Bayesian Cramer-Rao) bound with the best weight function.
+//! A lower bound of the error of given sensors: the van Trees (Bayesian Cramer-Rao) bound with the best weight function.
 
 use crate::observation::source::{Kind, Threshold};
 use crate::{Bank, Error};

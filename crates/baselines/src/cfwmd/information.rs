@@ -11,7 +11,7 @@
 //! threshold on a divergence equals a threshold on `q` that varies with time and sensor. For vector measurements the rules differ: the
 //! divergence weighs the innovation by `S^-1 (S - R) R^-1`.
 
-use crate::Error;
+use fewbits_cfwmd::Error;
 use fewbits_numerics::error::{finite, positive, refuse};
 use fewbits_numerics::normal;
 use serde::{Deserialize, Serialize};

@@ -1,8 +1,7 @@
 //! The smallest error that `N` bits allow if one encoder sees all measurements.
 
 use super::conditional_mean::ConditionalMean;
-use crate::Error;
-use crate::Source;
+use fewbits_binary_patterns::{Error, Source};
 use fewbits_numerics::error::{positive, refuse};
 use fewbits_numerics::newton;
 use fewbits_quantizers::density::{CellMoments, Density};
