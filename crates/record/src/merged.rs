@@ -5,7 +5,7 @@ use crate::column::Column;
 use crate::error::Error;
 use crate::integers::Integers;
 use crate::playback::{Playback, Row};
-use crate::schema::{Schema, TimeBase};
+use crate::schema::{Schema, TimeBase, TimeFormat};
 use fewbits_block_codec::ArgumentError;
 use std::collections::BTreeMap;
 use std::io::{Read, Seek};
@@ -39,6 +39,18 @@ fn unit(time: TimeBase) -> TimeBase {
         },
         numbered => numbered,
     }
+}
+
+fn described(time: TimeBase) -> String {
+    let TimeBase::Clock { decimals, format, .. } = time else {
+        return "numbers of rows".to_owned();
+    };
+    let what = match format {
+        TimeFormat::Seconds => "seconds",
+        TimeFormat::Utc => "UTC",
+        TimeFormat::Local => "times without a zone",
+    };
+    format!("{what} of {decimals} decimals")
 }
 
 /// Which of the wanted columns have other codes of whole numbers than those of the first recording.
@@ -94,8 +106,9 @@ pub fn merged<'a, R: Read + Seek>(
                 );
             }
             if unit(playback.schema().time) != unit(first.time) {
-                let found = format!("{:?} in recording {}", playback.schema().time, i + 1);
-                return Err(ArgumentError::new("time", found, format!("that of the first: {:?}", first.time)).into());
+                let found = format!("{} in recording {}", described(playback.schema().time), i + 1);
+                let expected = format!("{}, as in the first", described(first.time));
+                return Err(ArgumentError::new("time", found, expected).into());
             }
         }
     }
