@@ -110,7 +110,8 @@ fn several(options: &CatOptions) -> Result<Ending, Error> {
     let open = |file: &String| recording::open(Path::new(file));
     let mut playbacks: Vec<_> = options.files.iter().map(open).collect::<Result<_, Error>>()?;
     let first = &options.files[0];
-    let schema = playbacks[0].schema().clone();
+    let schema =
+        finest(playbacks[0].schema(), playbacks.iter().map(Playback::schema)).map_err(Error::recording(first))?;
     let selection = selection(options, &schema, first)?;
     let names: Vec<&str> = selection.names.iter().map(String::as_str).collect();
     let unfinished: Vec<usize> = (0..playbacks.len()).filter(|i| !playbacks[*i].is_finished()).collect();
@@ -136,6 +137,26 @@ fn several(options: &CatOptions) -> Result<Ending, Error> {
         ending = Ending::Failed;
     }
     Ok(ending)
+}
+
+/// The schema of the first recording, with ticks as fine as the finest.
+fn finest<'a>(first: &Schema, all: impl Iterator<Item = &'a Schema>) -> Result<Schema, fewbits_record::Error> {
+    let decimals = all.map(|schema| match schema.time() {
+        TimeBase::Clock { decimals, .. } => decimals,
+        _ => 0,
+    });
+    let finest = decimals.max().unwrap_or(0);
+    match first.time() {
+        TimeBase::Clock { format, tolerance, .. } => {
+            let time = TimeBase::Clock {
+                decimals: finest,
+                tolerance,
+                format,
+            };
+            Schema::new(first.columns().to_vec(), time)?.with_time_name(first.time_name())
+        }
+        _ => Ok(first.clone()),
+    }
 }
 
 /// Refuses recordings whose words have other numbers, or whose columns have other units: the unit of a column of words lists them.

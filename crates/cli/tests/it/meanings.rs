@@ -91,6 +91,35 @@ fn columns_of_other_units_are_not_put_together() {
 }
 
 #[test]
+fn recordings_of_other_decimals_are_one_table() {
+    let (_kept, folder) = folder();
+    put(&folder, "a.csv", &["time,v", "2024-03-05T10:00:00Z,1", "2024-03-05T10:00:02Z,3"]);
+    put(&folder, "b.csv", &["time,v", "2024-03-05T10:00:01.250Z,2", "2024-03-05T10:00:03.5Z,4"]);
+    pack(&folder, "a");
+    pack(&folder, "b");
+    for words in [&["cat", "a.fewb", "b.fewb"], &["cat", "b.fewb", "a.fewb"]] {
+        let rows = text(&good(&folder, &words[..], b""));
+        let expected = ["10:00:00Z,1", "10:00:01.250Z,2", "10:00:02Z,3", "10:00:03.500Z,4"];
+        let expected: String = expected.iter().map(|row| format!("2024-03-05T{row}\n")).collect();
+        assert_eq!(rows, format!("time,v\n{expected}"));
+    }
+    let from = [
+        "cat",
+        "a.fewb",
+        "b.fewb",
+        "--from",
+        "2024-03-05T10:00:00.5Z",
+        "--to",
+        "2024-03-05T10:00:02.5Z",
+    ];
+    assert_eq!(text(&good(&folder, &from, b"")).lines().count(), 3);
+    put(&folder, "c.csv", &["time,v", "2024-03-05T10:00:00,1"]);
+    pack(&folder, "c");
+    let refusal = refused(&folder, &["cat", "a.fewb", "c.fewb"], b"");
+    assert!(refusal.contains("times without a zone in recording 2: expected UTC, as in the first"), "{refusal}");
+}
+
+#[test]
 fn ends_of_a_range_mean_what_they_say() {
     let (_kept, folder) = folder();
     put(&folder, "local.csv", &["time,v", "2024-03-05T11:00:00,1", "2024-03-05T11:00:10,2"]);
@@ -148,4 +177,29 @@ fn a_signal_is_the_end_of_a_line_and_of_a_pipe() {
     let output = child.wait_with_output().unwrap();
     let said = text(&output.stderr);
     assert!(output.status.success() && said.contains("ended by a signal"), "{said}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_full_disk_leaves_whole_rows() {
+    let (_kept, folder) = folder();
+    let rows: String = (0..3000).map(|i| format!("{i},{}\n", f64::from(i) / 7.0)).collect();
+    std::fs::write(folder.join("b.csv"), format!("time,x\n{rows}")).unwrap();
+    good(&folder, &["send", "b.csv", "--time", "exact", "-o", "b.frames"], b"");
+    // The limit of a file's size stands for that of a disk.
+    let command = env!("CARGO_BIN_EXE_fewbits");
+    let script = format!("trap '' XFSZ; ulimit -f 25; cat b.frames | {command} receive - -o r.csv");
+    let output = std::process::Command::new("sh")
+        .args(["-c", &script])
+        .current_dir(&folder)
+        .output()
+        .unwrap();
+    let found = std::fs::read_to_string(folder.join("r.csv")).unwrap();
+    assert!(
+        !output.status.success() && text(&output.stderr).contains("cannot write"),
+        "{}",
+        text(&output.stderr)
+    );
+    assert!(found.len() > 8000 && found.ends_with('\n'), "{}", found.len());
+    assert!(format!("time,x\n{rows}").starts_with(&found));
 }

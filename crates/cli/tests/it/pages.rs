@@ -83,6 +83,6 @@ fn completions_and_manual_are_generated() {
         "fewbits-design.1",
         "fewbits-pack.1",
     ] {
-        assert!(folder.join(page).is_file(), "{page}");
+        assert!(folder.join("man").join(page).is_file(), "{page}");
     }
 }
