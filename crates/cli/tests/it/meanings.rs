@@ -195,11 +195,7 @@ fn a_full_disk_leaves_whole_rows() {
         .output()
         .unwrap();
     let found = std::fs::read_to_string(folder.join("r.csv")).unwrap();
-    assert!(
-        !output.status.success() && text(&output.stderr).contains("cannot write"),
-        "{}",
-        text(&output.stderr)
-    );
+    assert!(!output.status.success() && text(&output.stderr).contains("r.csv"), "{}", text(&output.stderr));
     assert!(found.len() > 8000 && found.ends_with('\n'), "{}", found.len());
     assert!(format!("time,x\n{rows}").starts_with(&found));
 }
