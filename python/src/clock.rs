@@ -2,11 +2,13 @@
 
 use crate::error::{Outcome, refused};
 use crate::table::Given;
+use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    TimestampMicrosecondType, TimestampMillisecondType, TimestampNanosecondType, TimestampSecondType,
+    Float64Type, TimestampMicrosecondType, TimestampMillisecondType, TimestampNanosecondType, TimestampSecondType,
 };
-use arrow_array::{ArrayRef, Float64Array, Int64Array, PrimitiveArray, RecordBatch};
+use arrow_array::{ArrayRef, Float64Array, Int64Array, PrimitiveArray, RecordBatch, StringArray};
 use arrow_schema::{ArrowError, DataType, Field, SchemaRef, TimeUnit};
+use fewbits_recipes::words;
 use fewbits_record::arrow::{cells, ticks};
 use fewbits_record::{Schema, TimeBase, TimeFormat};
 use std::sync::Arc;
@@ -39,6 +41,11 @@ pub(crate) fn clock(given: &Given, name: &str) -> Outcome<(TimeBase, Vec<i64>)> 
             _ => TimeFormat::Local,
         };
         return Ok((base(decimals, format), all));
+    }
+    if matches!(given.kind(name)?, DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View) {
+        let expected =
+            "timestamps, or seconds: `pandas.to_datetime(...)`, or `str.to_datetime()` of polars, makes times of texts";
+        return refused("time", format!("'{name}' of texts"), expected);
     }
     let Some(seconds) = given.numbers(name)?.into_iter().collect::<Option<Vec<f64>>>() else {
         return refused("time", format!("'{name}' with gaps"), "a time in every row");
@@ -87,7 +94,8 @@ impl Shown {
     }
 }
 
-/// The fields of a recording as a table: seconds as doubles, timestamps in UTC or without a zone, numbers of rows; then its columns.
+/// The fields of a recording as a table: seconds as doubles, timestamps in UTC or without a zone, numbers of rows; then its columns, those of
+/// words as texts.
 pub(crate) fn fields(schema: &Schema) -> arrow_schema::Schema {
     let own = schema.to_arrow();
     let time = match Shown::of(schema.time()) {
@@ -96,7 +104,11 @@ pub(crate) fn fields(schema: &Schema) -> arrow_schema::Schema {
         Shown::Stamps(unit, _, zone) => Field::new(schema.time_name(), DataType::Timestamp(unit, zone), false),
         Shown::Ticks => own.field(0).clone().with_name(schema.time_name()),
     };
-    let columns = own.fields().iter().skip(1).cloned();
+    let columns = own.fields().iter().skip(1).zip(schema.columns());
+    let columns = columns.map(|(field, column)| match words::of(column.unit()) {
+        Some(_) => Arc::new(Field::new(field.name(), DataType::Utf8, true).with_metadata(field.metadata().clone())),
+        None => field.clone(),
+    });
     arrow_schema::Schema::new(std::iter::once(Arc::new(time)).chain(columns).collect::<Vec<_>>())
 }
 
@@ -104,10 +116,10 @@ pub(crate) fn fields(schema: &Schema) -> arrow_schema::Schema {
 pub(crate) fn shown(
     batch: &RecordBatch,
     ticks: &[i64],
-    time: TimeBase,
+    schema: &Schema,
     fields: SchemaRef,
 ) -> Result<RecordBatch, ArrowError> {
-    let mut columns = batch.columns().to_vec();
+    let (time, mut columns) = (schema.time(), batch.columns().to_vec());
     let array: Option<ArrayRef> = match (Shown::of(time), time) {
         (Shown::Seconds, TimeBase::Clock { decimals, .. }) => {
             let scale = 10_f64.powi(decimals.into());
@@ -137,6 +149,17 @@ pub(crate) fn shown(
     };
     if let (Some(first), Some(array)) = (columns.first_mut(), array) {
         *first = array;
+    }
+    for (column, field) in columns.iter_mut().zip(fields.fields()).skip(1) {
+        if *field.data_type() == DataType::Utf8 {
+            let position = schema
+                .position(field.name())
+                .map_err(|error| ArrowError::ComputeError(error.to_string()))?;
+            let words = words::of(schema.columns()[position].unit()).unwrap_or_default();
+            let word = |number: Option<f64>| words.get(number? as usize).map(String::as_str);
+            let texts: StringArray = column.as_primitive::<Float64Type>().iter().map(word).collect();
+            *column = Arc::new(texts);
+        }
     }
     RecordBatch::try_new(fields, columns)
 }

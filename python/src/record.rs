@@ -196,11 +196,20 @@ pub(crate) fn write(
     let columns = taken.with_whole(bounds::columns(&taken.names, &specs, &taken.ranges())?)?;
     let schema = Schema::new(columns, taken.time)?.with_time_name(time.unwrap_or_default())?;
     py.detach(|| {
-        let folder = path
-            .parent()
-            .filter(|folder| !folder.as_os_str().is_empty())
-            .unwrap_or(Path::new("."));
-        let beside = tempfile::NamedTempFile::new_in(folder)?;
+        // A link stays a link.
+        let path = path.canonicalize().unwrap_or(path);
+        let earlier = std::fs::metadata(&path).ok();
+        // What may not be written to is not replaced.
+        let open = earlier
+            .as_ref()
+            .map(|_| std::fs::OpenOptions::new().write(true).open(&path));
+        let open = open.transpose()?;
+        let is_file = earlier.as_ref().is_none_or(std::fs::Metadata::is_file);
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let beside = match (folder, is_file) {
+            (_, false) => new_file().tempfile()?,
+            (folder, true) => new_file().tempfile_in(folder.unwrap_or(Path::new(".")))?,
+        };
         let mut recorder = Recorder::new(BufWriter::new(beside), schema).with_effort(effort);
         let mut stopped = None;
         let filled = fewbits_recipes::pack::fill(&mut taken.source(), &mut recorder, &mut watch(&mut stopped));
@@ -209,9 +218,28 @@ pub(crate) fn write(
         written.flush()?;
         let beside = written.into_inner().map_err(std::io::IntoInnerError::into_error)?;
         let bytes = beside.as_file().metadata()?.len();
-        beside.persist(&path).map_err(|error| error.error)?;
+        match (open, earlier) {
+            // A pipe or a device is written to.
+            (Some(mut device), _) if !is_file => {
+                std::io::copy(&mut beside.reopen()?, &mut device)?;
+            }
+            (_, earlier) => {
+                if let Some(earlier) = earlier {
+                    beside.as_file().set_permissions(earlier.permissions())?;
+                }
+                beside.persist(&path).map_err(|error| error.error)?;
+            }
+        }
         Ok(bytes)
     })
+}
+
+/// A new file with the rights that a program's files have.
+fn new_file() -> tempfile::Builder<'static, 'static> {
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder
 }
 
 /// The codes of whole numbers that count from the smallest.

@@ -103,7 +103,7 @@ impl Recorder {
         }
         let tick = match (time.is_none(), schema.time()) {
             (true, TimeBase::Numbered) => recorder.next_tick(),
-            _ => tick_of(time, "time", schema.time())?,
+            _ => tick_of(time, "time", schema.time(), Rounding::Nearest)?,
         };
         let row: Vec<Option<f64>> = schema
             .columns()
@@ -174,14 +174,36 @@ impl Recorder {
     }
 }
 
+/// Which tick stands for a time between two.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Rounding {
+    /// The time of a row.
+    Nearest,
+    /// The first that is not before the time: an end of a range.
+    Up,
+}
+
 /// A tick of a recording's clock: a number of seconds, or with a UTC clock a text or a NumPy datetime.
-pub(crate) fn tick_of(value: &Bound<'_, PyAny>, name: &'static str, time: TimeBase) -> Outcome<i64> {
+pub(crate) fn tick_of(
+    value: &Bound<'_, PyAny>,
+    name: &'static str,
+    time: TimeBase,
+    rounding: Rounding,
+) -> Outcome<i64> {
     let TimeBase::Clock { decimals, format, .. } = time else {
         return value.extract().or_else(|_| refused(name, value, "the number of a row"));
     };
     let scale = 10_f64.powi(decimals.into());
     if let Ok(seconds) = value.extract::<f64>() {
-        let tick = (seconds * scale).round();
+        let exact = seconds * scale;
+        let nearest = exact.round();
+        // A product of doubles is off by its last bits.
+        let is_tick = (exact - nearest).abs() <= 4.0 * f64::EPSILON * nearest.abs();
+        let tick = if is_tick || rounding == Rounding::Nearest {
+            nearest
+        } else {
+            exact.ceil()
+        };
         return if tick.abs() < i64::MAX as f64 {
             Ok(tick as i64)
         } else {
@@ -238,7 +260,11 @@ pub(crate) fn tick_of(value: &Bound<'_, PyAny>, name: &'static str, time: TimeBa
         return refused(name, value, "a time");
     };
     match MAX_DECIMALS.checked_sub(decimals) {
-        Some(fewer) => Ok(nanoseconds.div_euclid(10_i64.pow(fewer.into()))),
+        Some(fewer) => {
+            let tick = 10_i64.pow(fewer.into());
+            let is_between = rounding == Rounding::Up && nanoseconds.rem_euclid(tick) != 0;
+            Ok(nanoseconds.div_euclid(tick) + i64::from(is_between))
+        }
         None => nanoseconds
             .checked_mul(10_i64.pow((decimals - MAX_DECIMALS).into()))
             .map_or_else(|| refused(name, value, "a time within the clock's range"), Ok),

@@ -4,7 +4,7 @@ use crate::clock;
 use crate::error::{Outcome, refused};
 use crate::given::named;
 use crate::record::opened;
-use crate::recorder::tick_of;
+use crate::recorder::{Rounding, tick_of};
 use crate::table::{Table, joined};
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::{Array, RecordBatch, RecordBatchReader};
@@ -160,10 +160,10 @@ impl Recording {
         end: Option<&Bound<'_, PyAny>>,
     ) -> Outcome<Rows> {
         let time = self.schema.time();
-        let from = start.map_or(Ok(i64::MIN), |start| tick_of(start, "start", time))?;
+        let from = start.map_or(Ok(i64::MIN), |start| tick_of(start, "start", time, Rounding::Up))?;
         let to = match end {
             None => i64::MAX,
-            Some(end) => match tick_of(end, "end", time)?.checked_sub(1) {
+            Some(end) => match tick_of(end, "end", time, Rounding::Up)?.checked_sub(1) {
                 Some(last) => last,
                 None => return refused("end", end, "a time above the smallest"),
             },
@@ -294,7 +294,7 @@ impl Rows {
                         block.columns.iter_mut().for_each(Vec::clear);
                     }
                     let batch = block.to_record_batch(&schema)?;
-                    Ok(Some(clock::shown(&batch, &block.ticks, schema.time(), own.clone())?))
+                    Ok(Some(clock::shown(&batch, &block.ticks, &schema, own.clone())?))
                 });
                 let Some(batch) = batch.transpose() else {
                     continue;

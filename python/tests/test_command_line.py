@@ -81,3 +81,13 @@ def test_bytes_of_many_series_are_those_of_the_command(tmp_path, bound):
     columns = many()
     assert len(columns) == 75
     check(tmp_path, columns, bound)
+
+
+@pytest.mark.skipif(not COMMAND.exists(), reason="the command is not built")
+def test_words_of_the_command_are_texts(tmp_path):
+    table, path = tmp_path / "a.csv", tmp_path / "a.fewb"
+    table.write_text("t,door,v\n1,open,5\n2,closed,6\n3,,7\n")
+    subprocess.run([COMMAND, "pack", table, "--time", "exact", "-o", path], check=True, capture_output=True)
+    assert pl.DataFrame(fb.read(path))["door"].to_list() == ["open", "closed", None]
+    assert fb.scan(path).filter(pl.col("door") == "closed").collect()["v"].to_list() == [6.0]
+    assert fb.read(path, columns=["v"])["v"].tolist() == [5.0, 6.0, 7.0]

@@ -1,6 +1,7 @@
 """Tables of three libraries, both ways: nulls, NaN, infinities, time zones."""
 
 import math
+import os
 import pickle
 from datetime import UTC, date, datetime, timedelta, timezone
 from decimal import Decimal
@@ -520,3 +521,41 @@ def test_periods_are_no_seconds(tmp_path):
     for use in (lambda: centre.run(frame, time="t"), lambda: fb.write(frame, tmp_path / "a.fewb", time="a")):
         with pytest.raises(fb.ArgumentError, match="periods"):
             use()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="named pipes")
+def test_links_rights_and_devices_stay(tmp_path):
+    frame = pl.DataFrame({"v": [1.0]})
+    target, link, device = tmp_path / "target", tmp_path / "link", tmp_path / "device"
+    target.write_text("earlier")
+    target.chmod(0o640)
+    link.symlink_to(target)
+    size = fb.write(frame, link)
+    assert link.is_symlink() and target.stat().st_size == size and target.stat().st_mode & 0o777 == 0o640
+    os.mkfifo(device)
+    reader = os.open(device, os.O_RDONLY | os.O_NONBLOCK)
+    assert fb.write(frame, device) == len(os.read(reader, 1000)) and device.is_fifo()
+    os.close(reader)
+    fresh = tmp_path / "fresh"
+    fb.write(frame, fresh)
+    (tmp_path / "plain").write_text("")
+    assert fresh.stat().st_mode == (tmp_path / "plain").stat().st_mode
+    if os.geteuid() != 0:
+        target.chmod(0o400)
+        with pytest.raises(PermissionError):
+            fb.write(frame, target)
+
+
+def test_rows_of_a_range_lie_in_it(tmp_path):
+    path = tmp_path / "a.fewb"
+    fb.write(pl.DataFrame({"t": [0.0, 1.0, 2.0, 3.0], "v": [0, 1, 2, 3]}), path, time="t")
+    for start, end, rows in [(1.4, None, [2, 3]), (1.0, 2.0, [1]), (None, 2.5, [0, 1, 2])]:
+        assert list(fb.read(path, start=start, end=end)["v"]) == rows
+    stamps = np.datetime64("2026-03-01T10:00:00", "s") + np.arange(3)
+    fb.write(pl.DataFrame({"t": pa.array(stamps), "v": [0, 1, 2]}), path, time="t")
+    assert list(fb.read(path, start="2026-03-01T10:00:00.5")["v"]) == [1, 2]
+
+
+def test_texts_are_no_times(tmp_path):
+    with pytest.raises(fb.ArgumentError, match="to_datetime"):
+        fb.write(pl.DataFrame({"t": ["2026-03-01"], "v": [1.0]}), tmp_path / "a.fewb", time="t")

@@ -1,7 +1,7 @@
 //! Options of times.
 
 use crate::error::Error;
-pub(crate) use fewbits_recipes::times::{NANOSECONDS, shown, tick};
+pub(crate) use fewbits_recipes::times::{End, NANOSECONDS, shown, tick};
 
 /// The tolerance in nanoseconds from `exact` or text like `±10ms`.
 pub(crate) fn tolerance(text: &str) -> Result<u64, Error> {

@@ -20,7 +20,9 @@ pub(crate) fn run(options: &GenerateOptions) -> Result<Ending, Error> {
         Generated::Man => {
             if let Some(folder) = &options.folder {
                 let name = folder.display().to_string();
-                clap_mangen::generate_to(command, folder).map_err(Error::io(&name, "write"))?;
+                std::fs::create_dir_all(folder)
+                    .and_then(|()| clap_mangen::generate_to(command, folder))
+                    .map_err(Error::io(&name, "write"))?;
                 return Ok(Ending::Good);
             }
             let page = clap_mangen::Man::new(command);

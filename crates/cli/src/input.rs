@@ -8,7 +8,7 @@ use crate::opening::{chosen, decided, name_of, time_columns};
 use crate::say::say;
 use fewbits_recipes::{table as recipe, times};
 use fewbits_record::{Integers, TimeBase};
-use fewbits_table::{Batch, FewCells, Kind, Side, names};
+use fewbits_table::{Batch, FewCells, Kind, Scale, Side, Time, names};
 
 /// A row: its tick (`None` if rows are numbered) and its cells.
 pub(crate) type Row = (Option<i64>, Vec<Option<f64>>);
@@ -46,8 +46,6 @@ pub(crate) struct Survey {
     pub(crate) few: Vec<Option<FewCells>>,
     /// Largest number of decimals of a time.
     pub(crate) decimals: u8,
-    /// Whether there are no rows.
-    is_empty: bool,
 }
 
 impl Table {
@@ -91,13 +89,12 @@ impl Table {
 
     /// What the first rows show, if all others are like them: no ranges, and the decimals of the finest time.
     pub(crate) fn first_survey(&mut self) -> Result<Survey, Error> {
-        let is_empty = !self.fill()?;
+        self.fill()?;
         let times = self.batch.times.iter();
         Ok(Survey {
             ends: vec![None; self.names.len()],
             few: vec![None; self.names.len()],
             decimals: times.map(|time| time.decimals()).max().unwrap_or(0),
-            is_empty,
         })
     }
 
@@ -319,16 +316,21 @@ impl Table {
         }
     }
 
+    /// What times are measured from, and that of the first row.
+    pub(crate) fn first_time(&mut self) -> Result<Option<(Scale, Option<Time>)>, Error> {
+        let Some((_, scale)) = self.table.time() else {
+            return Ok(None);
+        };
+        self.fill()?;
+        Ok(Some((scale, self.batch.times.first().copied())))
+    }
+
     /// The time base for the times of the table, from its first row.
     pub(crate) fn time_base(&mut self, options: &TableOptions, survey: Option<&Survey>) -> Result<TimeBase, Error> {
-        let Some((_, scale)) = self.table.time() else {
+        let Some((scale, first)) = self.first_time()? else {
             return Ok(TimeBase::Numbered);
         };
         let nanoseconds = clock::tolerance(options.time.as_deref().unwrap_or("exact"))?;
-        let first = match survey {
-            Some(survey) if survey.is_empty => None,
-            _ => self.fill()?.then(|| self.batch.times.first().copied()).flatten(),
-        };
         Ok(times::base(scale, first, survey.map(|survey| survey.decimals), nanoseconds))
     }
 
@@ -391,7 +393,6 @@ impl Table {
             ends: columns.clone().map(|column| column.range).collect(),
             few: columns.map(fewbits_table::Profile::few).collect(),
             decimals: survey.times.decimals,
-            is_empty: survey.rows == 0,
         })
     }
 }

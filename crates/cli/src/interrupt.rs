@@ -4,6 +4,7 @@
 //! output is removed. A second signal ends a live task at once too.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 
 /// Exit code of a task that a signal ended.
@@ -64,4 +65,17 @@ pub(crate) fn forget(path: &Path) {
 pub(crate) fn on_stop(stop: impl Fn() + Send + 'static) {
     install();
     state().stop = Some(Box::new(stop));
+}
+
+/// Whether the first signal came, for tasks that look for it.
+static IS_STOPPED: AtomicBool = AtomicBool::new(false);
+
+/// The task looks for the first signal with [`is_stopped`], instead of ending at it.
+pub(crate) fn watch() {
+    on_stop(|| IS_STOPPED.store(true, Ordering::Relaxed));
+}
+
+/// Whether a signal came since [`watch`].
+pub(crate) fn is_stopped() -> bool {
+    IS_STOPPED.load(Ordering::Relaxed)
 }

@@ -55,6 +55,7 @@ mod towards;
 mod track;
 mod unpack;
 mod verify;
+mod waiting;
 
 use arguments::{Cli, Task};
 use clap::Parser;

@@ -75,7 +75,7 @@ pub(crate) struct Sheet {
 impl Sheet {
     /// Writes the names, for CSV.
     pub(crate) fn new(path: Option<&Path>, shape: Shape, names: Vec<String>) -> Result<Self, Error> {
-        let sink = Target::open(path)?;
+        let sink = Target::open(path)?.of_lines();
         let file = sink.name().to_owned();
         let rows = match shape {
             Shape::Csv => {

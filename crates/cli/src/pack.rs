@@ -10,10 +10,12 @@ use crate::rows::TableRows;
 use crate::say::say;
 use crate::single_pass::{is_written_beside, readable_once};
 use crate::target::{self, Target};
+use crate::unpack::same_unit;
 use crate::{Ending, bounds, clock};
 use fewbits_recipes::bounds::exact;
+use fewbits_recipes::{times, words};
 use fewbits_record::{Bound, Column, Effort, Playback, Recorder, Schema, TimeBase};
-use fewbits_table::{Kind, names};
+use fewbits_table::{Kind, Scale, Time, names};
 use serde::Serialize;
 use std::fs::File;
 use std::io::Write;
@@ -210,13 +212,36 @@ fn continued(options: &TableOptions, schema: &Schema, file: &str) -> Result<Tabl
     })
 }
 
+/// Refuses times that would be others in the recording. `begin`: its first tick.
+fn check_clock(table: &mut Table, time: TimeBase, begin: Option<i64>, file: &str) -> Result<(), Error> {
+    let (TimeBase::Clock { decimals, format, .. }, Some((scale, first))) = (time, table.first_time()?) else {
+        return Ok(());
+    };
+    // Seconds since 1970, not those of a run or of a day.
+    let is_dated = |time: Time| time.seconds() >= 1e8;
+    let problem = match (scale, times::scale(format)) {
+        (own, known) if own == known => return Ok(()),
+        (Scale::Seconds, Scale::Utc) if first.is_none_or(is_dated) => return Ok(()),
+        (Scale::Utc, Scale::Seconds) if begin.is_none_or(|tick| is_dated(Time::from_ticks(tick, decimals))) => {
+            return Ok(());
+        }
+        (Scale::Local, _) => "without a zone, and those of {} are not: say --time-zone UTC, or their zone",
+        (Scale::Utc, _) => "UTC, and those of {} have no zone or date: pack the table into a file of its own",
+        _ => "seconds, and those of {} are dates: pack the table into a file of its own",
+    };
+    Err(Error::content(table.file(), format!("its times are {}", problem.replace("{}", file))))
+}
+
 /// Continues a recording. A table that is refused, a kill and a full disk leave it as it was, and of two commands the second is refused.
 fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, Option<Error>), Error> {
     let file = path.display().to_string();
     if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
         return Err(Error::content(&file, "this is no file: a recording that is continued is read first"));
     }
-    let schema = Playback::open(path).map_err(Error::recording(&file))?.schema().clone();
+    let playback = Playback::open(path).map_err(Error::recording(&file))?;
+    let schema = playback.schema().clone();
+    let begin = playback.ticks().map_err(Error::recording(&file))?.map(|ticks| ticks.0);
+    drop(playback);
     let table_options = continued(&options.table, &schema, &file)?;
     let open = || -> Result<Table, Error> {
         let mut table = Table::open(&table_options)?;
@@ -226,9 +251,15 @@ fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, O
             let problem = format!("columns {names}: {file} has other columns, choose and order them with --columns");
             return Err(Error::content(table.file(), problem));
         }
+        for (i, column) in schema.columns().iter().enumerate() {
+            if words::of(column.unit()).is_none() {
+                same_unit(column, &table.unit(i), &file).map_err(|problem| Error::content(table.file(), problem))?;
+            }
+        }
         Ok(table)
     };
-    let table = open()?;
+    let mut table = open()?;
+    check_clock(&mut table, schema.time(), begin, &file)?;
     // A live table is appended as it comes: its rows cannot be read again.
     if !target::is_live() {
         TableRows::new(open()?, schema.time()).check()?;

@@ -2,6 +2,8 @@
 
 use crate::error::Error;
 use crate::files::is_regular;
+use crate::target::is_live;
+use crate::waiting::Source;
 use fewbits_record::Playback;
 use std::fs::File;
 use std::io::{Cursor, Read, Seek};
@@ -18,6 +20,15 @@ pub(crate) fn stream(file: &str) -> Result<(Box<dyn Read + Send>, &str), Error> 
         "-" => (Box::new(std::io::stdin()), "standard input"),
         file => (Box::new(File::open(file).map_err(Error::io(file, "open"))?), file),
     })
+}
+
+/// As [`stream`]; of a pipe, a signal is the end.
+pub(crate) fn live(file: &str) -> Result<(Box<dyn Read + Send>, &str), Error> {
+    let (source, name) = stream(file)?;
+    match is_live() {
+        true => Ok((Box::new(Source::new(source, None, None)), name)),
+        false => Ok((source, name)),
+    }
 }
 
 /// Opens a recording with random access. A pipe has none: its bytes are kept in memory.

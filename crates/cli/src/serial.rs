@@ -2,16 +2,14 @@
 //! receiver that starts in the middle, or after noise, therefore finds the next frame.
 
 use crate::error::Error;
+use crate::waiting::Source;
 use std::fs::{File, OpenOptions};
-use std::io::{ErrorKind, IsTerminal, Read, Write};
+use std::io::{IsTerminal, Read, Write};
 use std::process::Command;
-use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
 
 /// Largest length of a frame in bytes. Anything longer is noise.
 const MAX_FRAME: usize = 1 << 16;
-/// Chunks that are read ahead.
-const CHUNKS: usize = 64;
 /// Pause before a line without data is read again.
 const PAUSE: Duration = Duration::from_millis(20);
 
@@ -48,8 +46,7 @@ pub(crate) fn write(line: &mut File, frame: &[u8]) -> std::io::Result<()> {
 
 /// Frames as they come.
 pub(crate) struct Frames {
-    chunks: Receiver<std::io::Result<Vec<u8>>>,
-    timeout: Option<Duration>,
+    source: Source,
     /// Bytes of an incomplete frame.
     collected: Vec<u8>,
 }
@@ -57,46 +54,22 @@ pub(crate) struct Frames {
 impl Frames {
     /// Frames from a line. If it has no data, it is read again until the timeout.
     pub(crate) fn of_line(line: File, timeout: Option<Duration>) -> Self {
-        Self::new(line, timeout, Some(PAUSE))
+        Self::new(Source::new(line, timeout, Some(PAUSE)))
     }
 
     /// Frames from a stream, which ends.
     pub(crate) fn of_stream(source: impl Read + Send + 'static) -> Self {
-        Self::new(source, None, None)
+        Self::new(Source::new(source, None, None))
     }
 
-    fn new(mut source: impl Read + Send + 'static, timeout: Option<Duration>, pause: Option<Duration>) -> Self {
-        let (sender, chunks) = sync_channel(CHUNKS);
-        // Reading blocks and would delay the timeout: a thread reads. It ends with the process.
-        std::thread::spawn(move || {
-            let mut buffer = [0; 4096];
-            loop {
-                let chunk = match source.read(&mut buffer) {
-                    Ok(0) => match pause {
-                        Some(pause) => {
-                            std::thread::sleep(pause);
-                            continue;
-                        }
-                        None => return,
-                    },
-                    Ok(count) => Ok(buffer[..count].to_vec()),
-                    Err(error) if error.kind() == ErrorKind::Interrupted => continue,
-                    Err(error) => Err(error),
-                };
-                let is_last = chunk.is_err();
-                if sender.send(chunk).is_err() || is_last {
-                    return;
-                }
-            }
-        });
+    fn new(source: Source) -> Self {
         Self {
-            chunks,
-            timeout,
+            source,
             collected: Vec::new(),
         }
     }
 
-    /// The next frame; `None` after the timeout, or at the end of a stream.
+    /// The next frame; `None` after the timeout, at a signal, or at the end of a stream.
     pub(crate) fn next(&mut self) -> std::io::Result<Option<Vec<u8>>> {
         loop {
             if let Some(end) = self.collected.iter().position(|byte| *byte == 0) {
@@ -111,13 +84,10 @@ impl Frames {
             if self.collected.len() > MAX_FRAME {
                 self.collected.clear();
             }
-            let chunk = match self.timeout {
-                Some(timeout) => self.chunks.recv_timeout(timeout).ok(),
-                None => self.chunks.recv().ok(),
-            };
-            match chunk {
-                Some(chunk) => self.collected.extend(chunk?),
-                None => return Ok(None),
+            let mut buffer = [0; 4096];
+            match self.source.read(&mut buffer)? {
+                0 => return Ok(None),
+                count => self.collected.extend(&buffer[..count]),
             }
         }
     }

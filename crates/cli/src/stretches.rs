@@ -4,7 +4,7 @@ use crate::arguments::CatOptions;
 use crate::error::Error;
 use crate::output::{Cell, Shape, Sheet};
 use crate::say::say;
-use crate::unpack::{selection, warn_of_end};
+use crate::unpack::{same_unit, selection, warn_of_end};
 use crate::{Ending, clock, recording};
 use fewbits_recipes::words;
 use fewbits_record::{Aggregate, Schema, Stretch, TimeBase, WholeAggregate};
@@ -54,6 +54,14 @@ fn length(text: &str, time: TimeBase) -> Result<u64, Error> {
             .ok_or_else(|| Error::option("--every", text, "a number of rows, since this recording has no times"));
     };
     let refused = |expected| Error::option("--every", text, expected);
+    // Their lengths would be those of a mean month or year.
+    const MEAN: [&str; 8] = ["M", "month", "months", "y", "yr", "yrs", "year", "years"];
+    if text
+        .split(|c: char| !c.is_alphabetic())
+        .any(|unit| MEAN.contains(&unit))
+    {
+        return Err(refused("a time of one length, as 1d or 30d: months and years have several"));
+    }
     let time = humantime::parse_duration(text).map_err(|_| refused("a time, as 1h"))?;
     let ticks = time
         .as_nanos()
@@ -87,6 +95,7 @@ pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
     let mut head: Option<(TimeBase, u64, Vec<String>, String)> = None;
     // Whether each column has whole numbers of 64 bits, in the first recording.
     let mut wholes: Option<Vec<bool>> = None;
+    let mut first_schema: Option<Schema> = None;
     for file in &options.files {
         let mut playback = recording::open(Path::new(file))?;
         let schema = playback.schema().clone();
@@ -106,6 +115,13 @@ pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
             }
             Some(_) => {}
             None => head = Some((schema.time(), every, names.clone(), schema.time_name().to_owned())),
+        }
+        let first = first_schema.get_or_insert_with(|| schema.clone());
+        for name in &names {
+            if let (Ok(i), Ok(own)) = (first.position(name), schema.position(name)) {
+                same_unit(&first.columns()[i], schema.columns()[own].unit(), &options.files[0])
+                    .map_err(|problem| Error::content(file, problem))?;
+            }
         }
         let wanted: Vec<&str> = names.iter().map(String::as_str).collect();
         playback.columns(&wanted).map_err(Error::recording(file))?;

@@ -52,12 +52,23 @@ enum Place {
     },
 }
 
+/// Bytes of a text that were written.
+#[derive(Default)]
+struct Lines {
+    all: u64,
+    /// Those up to the end of the last whole line.
+    whole: u64,
+    is_cut: bool,
+}
+
 /// An output.
 pub(crate) struct Target {
     /// `None` for standard output.
     file: Option<File>,
     place: Place,
     name: String,
+    /// Of a text.
+    lines: Option<Lines>,
     /// The earlier file, locked: two commands with live sources would each replace what the other has written.
     _earlier: Option<File>,
 }
@@ -70,6 +81,7 @@ impl Target {
                 file: None,
                 place: Place::Direct,
                 name: STANDARD_OUTPUT.to_owned(),
+                lines: None,
                 _earlier: None,
             });
         };
@@ -139,6 +151,7 @@ impl Target {
             file: Some(file),
             place,
             name,
+            lines: None,
             _earlier: locked,
         })
     }
@@ -149,6 +162,20 @@ impl Target {
             return Err(Error::Terminal);
         }
         Self::open(path)
+    }
+
+    /// States that lines are written: a full disk leaves whole ones. The end of a line that is cut would be read as another number.
+    pub(crate) fn of_lines(mut self) -> Self {
+        self.lines = Some(Lines::default());
+        self
+    }
+
+    /// Takes a line that is not whole out of a file, after an error. Nothing is written behind it.
+    fn cut(&mut self) {
+        let is_file = matches!(self.place, Place::New { .. } | Place::Beside { .. });
+        if let (Some(file), Some(lines), true) = (&self.file, &mut self.lines, is_file) {
+            lines.is_cut = file.set_len(lines.whole).is_ok();
+        }
     }
 
     /// The name in messages.
@@ -251,10 +278,26 @@ fn is_abandoned(path: &Path) -> bool {
 
 impl Write for Target {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        if self.lines.as_ref().is_some_and(|lines| lines.is_cut) {
+            return Err(std::io::ErrorKind::StorageFull.into());
+        }
         let written = match &mut self.file {
-            Some(file) => file.write(bytes)?,
-            None => std::io::stdout().lock().write(bytes)?,
+            Some(file) => file.write(bytes),
+            None => std::io::stdout().lock().write(bytes),
         };
+        if written
+            .as_ref()
+            .is_err_and(|error| error.kind() != std::io::ErrorKind::Interrupted)
+        {
+            self.cut();
+        }
+        let written = written?;
+        if let Some(lines) = &mut self.lines {
+            if let Some(end) = bytes[..written].iter().rposition(|byte| *byte == b'\n') {
+                lines.whole = lines.all + end as u64 + 1;
+            }
+            lines.all += written as u64;
+        }
         if let Place::New { is_empty, .. } | Place::Beside { is_empty, .. } = &mut self.place {
             *is_empty &= written == 0;
         }

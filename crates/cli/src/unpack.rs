@@ -1,14 +1,15 @@
 //! `fewbits unpack` and `fewbits cat`: convert a recording to CSV or JSON lines.
 
 use crate::arguments::{CatOptions, UnpackOptions};
+use crate::clock::{self, End};
 use crate::error::Error;
 use crate::files::is_regular;
 use crate::output::{Shape, Writer};
 use crate::say::{self, say};
-use crate::{Ending, clock, recording};
+use crate::{Ending, recording};
 use fewbits_recipes::unpack::{self, Selection};
 use fewbits_recipes::{Failure, words};
-use fewbits_record::{Block, BlockReader, Playback, Schema, TimeBase, merged};
+use fewbits_record::{Block, BlockReader, Column, Playback, Schema, TimeBase, merged};
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -31,21 +32,20 @@ impl UnpackOptions {
     }
 }
 
-fn end(text: Option<&String>, option: &'static str, time: TimeBase, otherwise: i64) -> Result<i64, Error> {
-    let Some(text) = text else { return Ok(otherwise) };
-    let expected = match time {
-        TimeBase::Numbered => "a row number, since this recording has no times",
-        _ => "a time as the recording writes it",
-    };
-    clock::tick(text, time).map_err(|_| Error::option(option, text, expected))
+fn end(text: Option<&String>, option: &'static str, time: TimeBase, end: End) -> Result<i64, Error> {
+    match (text, end) {
+        (Some(text), _) => clock::tick(text, time, end).map_err(|expected| Error::option(option, text, expected)),
+        (None, End::From) => Ok(i64::MIN),
+        (None, End::To) => Ok(i64::MAX),
+    }
 }
 
 /// The selected rows and columns.
 pub(crate) fn selection(options: &CatOptions, schema: &Schema, file: &str) -> Result<Selection, Error> {
     let mut selection = Selection::new(schema, &options.columns).map_err(Error::recording(file))?;
     selection.ticks = (
-        end(options.from.as_ref(), "--from", schema.time(), i64::MIN)?,
-        end(options.to.as_ref(), "--to", schema.time(), i64::MAX)?,
+        end(options.from.as_ref(), "--from", schema.time(), End::From)?,
+        end(options.to.as_ref(), "--to", schema.time(), End::To)?,
     );
     Ok(selection)
 }
@@ -110,7 +110,8 @@ fn several(options: &CatOptions) -> Result<Ending, Error> {
     let open = |file: &String| recording::open(Path::new(file));
     let mut playbacks: Vec<_> = options.files.iter().map(open).collect::<Result<_, Error>>()?;
     let first = &options.files[0];
-    let schema = playbacks[0].schema().clone();
+    let schema =
+        finest(playbacks[0].schema(), playbacks.iter().map(Playback::schema)).map_err(Error::recording(first))?;
     let selection = selection(options, &schema, first)?;
     let names: Vec<&str> = selection.names.iter().map(String::as_str).collect();
     let unfinished: Vec<usize> = (0..playbacks.len()).filter(|i| !playbacks[*i].is_finished()).collect();
@@ -138,7 +139,27 @@ fn several(options: &CatOptions) -> Result<Ending, Error> {
     Ok(ending)
 }
 
-/// Refuses recordings whose words have other numbers: the unit of a column of words lists them.
+/// The schema of the first recording, with ticks as fine as the finest.
+fn finest<'a>(first: &Schema, all: impl Iterator<Item = &'a Schema>) -> Result<Schema, fewbits_record::Error> {
+    let decimals = all.map(|schema| match schema.time() {
+        TimeBase::Clock { decimals, .. } => decimals,
+        _ => 0,
+    });
+    let finest = decimals.max().unwrap_or(0);
+    match first.time() {
+        TimeBase::Clock { format, tolerance, .. } => {
+            let time = TimeBase::Clock {
+                decimals: finest,
+                tolerance,
+                format,
+            };
+            Schema::new(first.columns().to_vec(), time)?.with_time_name(first.time_name())
+        }
+        _ => Ok(first.clone()),
+    }
+}
+
+/// Refuses recordings whose words have other numbers, or whose columns have other units: the unit of a column of words lists them.
 pub(crate) fn words_agree<'a>(
     first: &Schema,
     all: impl Iterator<Item = &'a Schema>,
@@ -158,7 +179,19 @@ pub(crate) fn words_agree<'a>(
                 let name = say::name(column.name());
                 return Err(Error::content(file, format!("column `{name}` has other words than in {}", files[0])));
             }
+            if let Ok(unit) = unit(schema) {
+                same_unit(column, &unit, &files[0]).map_err(|problem| Error::content(file, problem))?;
+            }
         }
     }
     Ok(())
+}
+
+/// Refuses another unit than that of a column of a file, if both are known.
+pub(crate) fn same_unit(column: &Column, unit: &str, file: &str) -> Result<(), String> {
+    if unit == column.unit() || unit.is_empty() || column.unit().is_empty() {
+        return Ok(());
+    }
+    let (name, known) = (say::name(column.name()), column.unit());
+    Err(format!("column `{name}` is in {unit}, and in {known} in {file}: convert it, or keep the two apart"))
 }

@@ -29,21 +29,29 @@ pub fn scale(format: TimeFormat) -> Scale {
     }
 }
 
-/// The tick of a time that a user wrote.
+/// An end of a range of times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    /// Rows at this time and behind it.
+    From,
+    /// Rows at this time and before it.
+    To,
+}
+
+/// The tick of a time that a user wrote as an end of a range: of a time between two ticks, the one that lies in the range.
 ///
 /// # Errors
-/// If the text is no time, or one that the recording cannot have.
-pub fn tick(text: &str, time: TimeBase) -> Result<i64, Problem> {
-    const NO_TIME: Problem = ("is not a time", "write it as the recording does: seconds, or as 2026-01-31T12:00:00.5Z");
-    let TimeBase::Clock {
-        decimals,
-        tolerance,
-        format,
-    } = time
-    else {
+/// What is expected instead, if the text is no time, or one that the recording cannot have.
+pub fn tick(text: &str, time: TimeBase, end: End) -> Result<i64, &'static str> {
+    let TimeBase::Clock { decimals, format, .. } = time else {
         return text
             .parse()
-            .map_err(|_| ("is not a row number", "write a whole number"));
+            .map_err(|_| "a row number, since this recording has no times");
+    };
+    let expected = match format {
+        TimeFormat::Utc => "a time, as 2026-01-31T12:00:00.5Z",
+        TimeFormat::Local => "a time without a zone, as those of the recording: 2026-01-31T12:00:00.5",
+        _ => "seconds, as times of the recording are",
     };
     // One column, and no line of names.
     let said = Dialect {
@@ -60,14 +68,13 @@ pub fn tick(text: &str, time: TimeBase) -> Result<i64, Problem> {
         table.read(&mut batch, 1)?;
         Ok::<_, fewbits_table::Error>(batch.times.first().copied().zip(found))
     };
-    let (found, own) = open().ok().flatten().ok_or(NO_TIME)?;
-    if (own == Scale::Seconds) != (scale(format) == Scale::Seconds) {
-        return Err(NO_TIME);
+    let (found, own) = open().ok().flatten().ok_or(expected)?;
+    // Times without a zone are read as UTC if the recording has that.
+    if own != scale(format) && (own, format) != (Scale::Local, TimeFormat::Utc) {
+        return Err(expected);
     }
-    match found.ticks(decimals).ok_or(TOO_LARGE)? {
-        (_, false) if tolerance == 0 => Err(TOO_FINE),
-        (tick, _) => Ok(tick),
-    }
+    let (tick, is_exact) = found.ticks(decimals).ok_or("a time that fits the recording's ticks")?;
+    Ok(tick.saturating_add(i64::from(!is_exact && end == End::From)))
 }
 
 /// A tick as text.
@@ -159,12 +166,12 @@ mod tests {
 
     #[test]
     fn times_return_as_they_were_written() {
+        let tick = |text: &str, time| tick(text, time, End::From);
         let seconds = clock(3, 0, TimeFormat::Seconds);
         for text in ["0", "12.5", "-0.125", "1518567890.001"] {
             assert_eq!(shown(tick(text, seconds).unwrap(), seconds), text);
         }
         assert_eq!(tick("1.5e2", seconds), Ok(150_000));
-        assert_eq!(tick("0.1234", seconds), Err(TOO_FINE));
         assert!(tick("noon", seconds).is_err());
         let utc = clock(9, 0, TimeFormat::Utc);
         assert_eq!(shown(tick("2026-01-31T12:00:00.250Z", utc).unwrap(), utc), "2026-01-31T12:00:00.250000000Z");
@@ -172,5 +179,21 @@ mod tests {
         assert_eq!(tick("2014-04-10T02:00:00+02:00", utc), Ok(1_397_088_000_000_000_000));
         let local = clock(0, 0, TimeFormat::Local);
         assert_eq!(shown(tick("1952-01-01 00:00", local).unwrap(), local), "1952-01-01T00:00:00");
+    }
+
+    #[test]
+    fn ends_between_two_ticks_lie_in_the_range() {
+        let seconds = clock(0, 0, TimeFormat::Seconds);
+        for (text, from, to) in [("1.5", 2, 1), ("-1.5", -1, -2), ("7", 7, 7)] {
+            assert_eq!((tick(text, seconds, End::From), tick(text, seconds, End::To)), (Ok(from), Ok(to)));
+        }
+    }
+
+    #[test]
+    fn a_zone_is_no_end_of_times_without_one() {
+        let local = clock(0, 0, TimeFormat::Local);
+        for text in ["2024-03-05T11:00:05Z", "2024-03-05T11:00:05+02:00", "12"] {
+            assert!(tick(text, local, End::From).unwrap_err().contains("without a zone"), "{text}");
+        }
     }
 }

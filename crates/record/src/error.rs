@@ -24,7 +24,7 @@ pub enum Error {
     #[error("an earlier write failed: resume the recording to go on")]
     Broken,
     /// The bytes do not begin like a recording.
-    #[error("not a recording: the first bytes are not those of one")]
+    #[error("not a recording: it is empty, or the first bytes are not those of one")]
     NotARecording,
     /// Another program writes to the file.
     #[error("the recording is being written by another program: wait until it ends")]

@@ -5,7 +5,7 @@ use crate::column::Column;
 use crate::error::Error;
 use crate::integers::Integers;
 use crate::playback::{Playback, Row};
-use crate::schema::{Schema, TimeBase};
+use crate::schema::{Schema, TimeBase, TimeFormat};
 use fewbits_block_codec::ArgumentError;
 use std::collections::BTreeMap;
 use std::io::{Read, Seek};
@@ -13,6 +13,8 @@ use std::io::{Read, Seek};
 /// Rows of one recording.
 struct Source<'a, R> {
     rows: Rows<'a, R>,
+    /// How many of the finest ticks one tick is.
+    factor: i64,
     /// Codes of whole numbers, of this recording and of the first, by their place in a row.
     codes: Vec<(usize, Integers, Integers)>,
     next: Option<Row>,
@@ -29,16 +31,22 @@ fn names(schema: &Schema) -> Vec<&str> {
     schema.columns.iter().map(Column::name).collect()
 }
 
-/// What ticks mean, without the tolerance.
-fn unit(time: TimeBase) -> TimeBase {
+/// The format of times and their decimals; `None` if rows are numbered.
+fn clock(time: TimeBase) -> Option<(TimeFormat, u8)> {
     match time {
-        TimeBase::Clock { decimals, format, .. } => TimeBase::Clock {
-            decimals,
-            tolerance: 0,
-            format,
-        },
-        numbered => numbered,
+        TimeBase::Clock { decimals, format, .. } => Some((format, decimals)),
+        TimeBase::Numbered => None,
     }
+}
+
+fn described(time: TimeBase) -> String {
+    let what = match clock(time) {
+        None => "numbers of rows",
+        Some((TimeFormat::Seconds, _)) => "seconds",
+        Some((TimeFormat::Utc, _)) => "UTC",
+        Some((TimeFormat::Local, _)) => "times without a zone",
+    };
+    what.to_owned()
 }
 
 /// Which of the wanted columns have other codes of whole numbers than those of the first recording.
@@ -69,12 +77,12 @@ fn recoded(mut row: Row, codes: &[(usize, Integers, Integers)]) -> Row {
 }
 
 /// The rows with ticks in `from..=to` of several recordings as one table: at each step the earliest next row, of equal ticks that of the
-/// first recording. Columns are those of the first recording, by their names. A recording is opened when its first tick is reached, so
+/// first recording. Ticks are those of the recording whose times have the most decimals. Columns are those of the first recording, by their names. A recording is opened when its first tick is reached, so
 /// recordings one after the other take the memory of one block. Damaged bytes give one error per stretch; the iteration continues behind
 /// them. Columns that were requested before are forgotten.
 ///
 /// # Errors
-/// If the recordings have different columns, or ticks of different units, or the only block of one is damaged.
+/// If the recordings have different columns, or times of different formats, or the only block of one is damaged.
 pub fn merged<'a, R: Read + Seek>(
     playbacks: &'a mut [Playback<R>],
     wanted: &[&str],
@@ -93,20 +101,33 @@ pub fn merged<'a, R: Read + Seek>(
                     ArgumentError::new("columns", found, format!("those of the first: {}", sorted.join(", "))).into()
                 );
             }
-            if unit(playback.schema().time) != unit(first.time) {
-                let found = format!("{:?} in recording {}", playback.schema().time, i + 1);
-                return Err(ArgumentError::new("time", found, format!("that of the first: {:?}", first.time)).into());
+            if clock(playback.schema().time).map(|own| own.0) != clock(first.time).map(|own| own.0) {
+                let found = format!("{} in recording {}", described(playback.schema().time), i + 1);
+                let expected = format!("{}, as in the first", described(first.time));
+                return Err(ArgumentError::new("time", found, expected).into());
             }
         }
     }
+    let decimals = |playback: &Playback<R>| clock(playback.schema().time).map_or(0, |own| own.1);
+    let finest = playbacks.iter().map(decimals).max().unwrap_or(0);
     let mut sources = BTreeMap::new();
     for (i, playback) in playbacks.iter_mut().enumerate() {
         playback.columns(wanted)?;
         // Without an index the first tick is not known: such a recording is open from the beginning.
-        let begin = playback.ticks()?.map_or(i64::MIN, |ticks| ticks.0.max(from));
+        let factor = 10_i64.pow(u32::from(finest - decimals(playback)));
+        let begin = playback
+            .ticks()?
+            .map_or(i64::MIN, |ticks| ticks.0.saturating_mul(factor).max(from));
         let codes = codes(playback.schema(), first.as_ref(), wanted)?;
-        let (rows, next) = (playback.range(from, to), None);
-        sources.insert((begin, i), Source { rows, codes, next });
+        let own_from = from.div_euclid(factor) + i64::from(from.rem_euclid(factor) != 0);
+        let (rows, next) = (playback.range(own_from, to.div_euclid(factor)), None);
+        let source = Source {
+            rows,
+            factor,
+            codes,
+            next,
+        };
+        sources.insert((begin, i), source);
     }
     Ok(Merged { sources })
 }
@@ -120,11 +141,17 @@ impl<R: Read + Seek> Iterator for Merged<'_, R> {
             let (tick, item) = match source.next.take() {
                 Some(row) => (tick, Some(Ok(row))),
                 None => match source.rows.next() {
-                    Some(Ok(row)) => {
-                        let tick = row.tick;
-                        source.next = Some(recoded(row, &source.codes));
-                        (tick, None)
-                    }
+                    Some(Ok(mut row)) => match row.tick.checked_mul(source.factor) {
+                        Some(finer) => {
+                            row.tick = finer;
+                            source.next = Some(recoded(row, &source.codes));
+                            (finer, None)
+                        }
+                        None => {
+                            let expected = "a tick that fits 64 bits with the decimals of the finest recording";
+                            (tick, Some(Err(ArgumentError::new("time", row.tick, expected).into())))
+                        }
+                    },
                     Some(Err(error)) => (tick, Some(Err(error))),
                     // The recording is closed.
                     None => continue,

@@ -84,13 +84,7 @@ pub(crate) fn detect(head: &Head, dialect: &mut Dialect) -> Result<Layout, Error
         .filter(|line| !line.trim().is_empty())
         .collect();
     if dialect.quote.is_none() {
-        let is_single = filled.first().is_some_and(|line| {
-            line.len() > 1
-                && line
-                    .split([',', ';', '\t'])
-                    .all(|cell| cell.starts_with('\'') && cell.ends_with('\'') && cell.len() > 1)
-        });
-        dialect.quote = Some(if is_single { '\'' } else { '"' });
+        dialect.quote = Some(marks::quote(&filled));
     }
     let quote = dialect.quote.map_or(b'"', |mark| mark as u32 as u8);
     let delimiter = match &dialect.delimiter {
@@ -329,7 +323,16 @@ fn layout(
                     && row[1..].iter().any(is_numeric)
                     && row.len() == looks[i - 1].len()
             };
-            if let Some(first) = (1..header.saturating_sub(2)).find(|i| (*i..i + 3).all(may_be_row)) {
+            // Above one row, the names of another table must stand: it shares most of its names with this one.
+            let names = &rows[header].1;
+            let are_shared = |i: usize| {
+                let above: Vec<&String> = rows[i].1.iter().filter(|name| !name.is_empty()).collect();
+                let shared = above.iter().filter(|name| names.contains(name)).count();
+                shared >= 2 && 2 * shared > above.len()
+            };
+            let begins =
+                |i: &usize| may_be_row(*i) && are_shared(i - 1) || i + 3 <= header && (*i..i + 3).all(may_be_row);
+            if let Some(first) = (1..header).find(begins) {
                 return Err(several_tables(rows[first].0));
             }
             dialect.skip = Some(lines_before(rows[header].0));

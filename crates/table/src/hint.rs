@@ -57,6 +57,8 @@ pub(crate) fn hint(text: &str) -> &'static str {
     } else if text.len() > 1 && text.bytes().all(|c| c.is_ascii_hexdigit()) {
         "if a unit stands behind the number, say --strip-units; hexadecimal numbers are not read: convert the column, or leave it out with \
          --without"
+    } else if text.starts_with('#') {
+        "if it is an error of a spreadsheet, make it a gap with --missing"
     } else if text.ends_with(FLAGS) {
         "if a mark stands behind the number, --strip-units cuts it off"
     } else if text.ends_with('%') || text.ends_with(|c: char| c.is_alphabetic()) && !text.contains('x') {

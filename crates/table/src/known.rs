@@ -1,6 +1,7 @@
 //! Formats of loggers that are known by their first lines, and words for units.
 
 use crate::dialect::Dialect;
+use crate::missing;
 
 /// Whether a first line announces a format whose data begin later.
 pub(crate) fn needs_more(line: &[u8]) -> bool {
@@ -234,8 +235,10 @@ pub(crate) fn are_units(cells: &[String]) -> bool {
             || is_date_pattern
             || is_known(&lower)
             || (is_compound && factors.all(is_known))
-            || lower.parse::<f64>().is_ok()
+            || lower == "1"
     };
-    let is_word = |cell: &String| !cell.trim().is_empty() && cell.parse::<f64>().is_err();
-    cells.iter().any(is_word) && cells.iter().all(|cell| is_unit(cell))
+    // A gap, as `M` or `N.A.`, tells of no units.
+    let is_word = |cell: &String| cell != "1" && !missing::is_usual(cell.trim(), true);
+    let is_row = cells.first().is_some_and(|cell| cell.trim() == "1");
+    !is_row && cells.iter().any(is_word) && cells.iter().all(|cell| is_unit(cell))
 }

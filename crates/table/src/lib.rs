@@ -66,6 +66,7 @@ mod known;
 mod labelled;
 mod limits;
 mod lines;
+mod logs;
 mod marks;
 mod missing;
 mod named;

@@ -84,3 +84,13 @@ pub(crate) fn doubtful_groups(rows: &[(u64, Vec<String>)]) -> Option<(u64, &str)
         first.filter(|_| groups >= 3 && hundreds >= 3)
     })
 }
+
+/// The mark around cells: a single one if all cells of the names, or of the first row, stand between two.
+pub(crate) fn quote(lines: &[&str]) -> char {
+    let is_quoted = |cell: &str| cell.len() > 1 && cell.starts_with('\'') && cell.ends_with('\'');
+    let is_single = lines
+        .iter()
+        .take(2)
+        .any(|line| line.split([',', ';', '\t']).all(is_quoted));
+    if is_single { '\'' } else { '"' }
+}

@@ -1,8 +1,8 @@
 //! Spellings of a missing sample.
 
 /// Spellings that mean a gap in every column.
-const ALWAYS: [&str; 13] = [
-    "", "na", "n/a", "null", "none", "#n/a", "#na", "<na>", "nat", "nil", "nodata", "no data", "\\n",
+const ALWAYS: [&str; 14] = [
+    "", "na", "n/a", "n.a.", "null", "none", "#n/a", "#na", "<na>", "nat", "nil", "nodata", "no data", "\\n",
 ];
 /// Spellings that mean a gap in a column of numbers; in a column of words they are words.
 const AMONG_NUMBERS: [&str; 12] = [

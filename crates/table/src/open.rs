@@ -10,7 +10,7 @@ use crate::lines::{Lines, Row, Split};
 use crate::profile::Profile;
 use crate::rows::Rows;
 use crate::table::Table;
-use crate::{influx, known, labelled, names, source};
+use crate::{influx, known, labelled, logs, names, source};
 use std::io::{BufRead, Cursor, Read};
 
 impl Table {
@@ -50,10 +50,10 @@ impl Table {
             });
         }
         if first == Some(b'<') {
-            return Err(Error::Format {
+            return Err(logs::refusal(&head).unwrap_or(Error::Format {
                 what: "a page of HTML, or XML",
                 mend: "export the table as CSV",
-            });
+            }));
         }
         let is_labelled = || {
             said.delimiter.is_none() && said.no_header.is_none() && said.skip.is_none() && labelled::is_labelled(&head)
@@ -67,7 +67,9 @@ impl Table {
         } else if said.delimiter.is_none() && said.skip.is_none() && influx::is_protocol(&head) {
             of_keys(&head, reader, &mut dialect, "InfluxDB line protocol", influx::pairs)?
         } else {
-            of_text(&head, reader, &mut dialect, said)?
+            let is_open = said.no_header.is_none() && said.skip.is_none();
+            of_text(&head, reader, &mut dialect, said)
+                .map_err(|error| logs::refusal(&head).filter(|_| is_open).unwrap_or(error))?
         };
         let profiles = first_profiles(&head, &rows, &columns, &dialect);
         Self::new(rows, dialect, columns, profiles)

@@ -164,7 +164,9 @@ impl Table {
                     ..self.dialect.clone()
                 };
                 let name = self.columns[i].own_name.clone();
-                self.clocks[i] = clock::clock(&[&name], &self.profiles[i].sample, None, &mut own).ok();
+                // A table of Arrow arrays without rows has no profiles here.
+                let sample = self.profiles.get(i).map_or(&[][..], |profile| &profile.sample);
+                self.clocks[i] = clock::clock(&[&name], sample, None, &mut own).ok();
             }
         }
     }

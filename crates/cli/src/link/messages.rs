@@ -90,7 +90,7 @@ fn source(options: &ReceiveOptions, format: Format) -> Result<(Source, String), 
         let shown = crate::place::shown(place);
         return Err(Error::content(&shown, crate::place::NO_MQTT));
     }
-    let (stream, name) = recording::stream(&options.file)?;
+    let (stream, name) = recording::live(&options.file)?;
     let name = name.to_owned();
     if format == Format::SenmlCbor {
         let mut rest = None::<Vec<u8>>;
@@ -128,16 +128,8 @@ fn at_broker(place: &str, timeout: Option<std::time::Duration>) -> Result<(Sourc
     let broker = crate::place::mqtt(broker).map_err(|error| Error::content(&shown, error))?;
     let messages = fewbits_link::mqtt::Messages::open(broker, vec![topic.to_owned()])?;
     crate::say::say!("listening at {shown}");
-    let next = move || {
-        loop {
-            let wait = timeout.unwrap_or(std::time::Duration::from_secs(60));
-            match messages.receive(wait) {
-                Some((_, content)) => return Ok(Some(content)),
-                None if timeout.is_some() => return Ok(None),
-                None => {}
-            }
-        }
-    };
+    crate::interrupt::watch();
+    let next = move || crate::waiting::next(timeout, |wait| Ok(messages.receive(wait).map(|(_, content)| content)));
     Ok((Box::new(next), shown))
 }
 

@@ -6,19 +6,21 @@ use crate::error::Error;
 use crate::output::{Shape, Writer};
 use crate::say::say;
 use crate::unpack::write_blocks;
-use crate::{Ending, node, recording, serial};
+use crate::{Ending, interrupt, node, recording, serial, waiting};
 use fewbits_link::{Transport, Udp};
 use fewbits_recipes::unpack::Selection;
 use fewbits_record::BlockReader;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
-
-/// Longest wait for a datagram before it is looked whether a signal came.
-const WAIT: Duration = Duration::from_millis(200);
 
 /// Runs `receive`.
 pub(crate) fn run(options: &ReceiveOptions) -> Result<Ending, Error> {
+    let ending = received(options)?;
+    if interrupt::is_stopped() {
+        say!("note: ended by a signal: the rows that had arrived are written");
+    }
+    Ok(ending)
+}
+
+fn received(options: &ReceiveOptions) -> Result<Ending, Error> {
     if let Some(format) = options.format {
         return super::messages::run(options, format);
     }
@@ -45,7 +47,7 @@ pub(crate) fn run(options: &ReceiveOptions) -> Result<Ending, Error> {
 }
 
 fn receive_stream(options: &ReceiveOptions) -> Result<Ending, Error> {
-    let (source, name) = recording::stream(&options.file)?;
+    let (source, name) = recording::live(&options.file)?;
     let blocks = BlockReader::new(source).map_err(Error::recording(name))?;
     let all = Selection::all(blocks.schema());
     let mut writer = Writer::new(options.output.as_deref(), Shape::Csv, blocks.schema(), &all.names)?;
@@ -66,28 +68,12 @@ fn receive_datagrams(options: &ReceiveOptions, address: &str) -> Result<Ending, 
         .map_err(Error::io(address, "listen"))?;
     say!("listening at {}", socket.address());
     // A signal is the end: what did not arrive is counted.
-    let is_stopped = Arc::new(AtomicBool::new(false));
-    let stop = Arc::clone(&is_stopped);
-    crate::interrupt::on_stop(move || stop.store(true, Ordering::Relaxed));
+    interrupt::watch();
     let ending = receive_frames(options, address, Senders::Any, || {
-        let begun = Instant::now();
-        loop {
-            // What has arrived is taken before the end.
-            let is_last = is_stopped.load(Ordering::Relaxed);
-            let left = options.timeout.map(|timeout| timeout.saturating_sub(begun.elapsed()));
-            let wait = if is_last {
-                Duration::ZERO
-            } else {
-                left.unwrap_or(WAIT).min(WAIT)
-            };
-            match socket.receive(wait).map_err(of_socket)? {
-                Some((_, bytes)) => return Ok(Some(bytes.to_vec())),
-                None if is_last || options.timeout.is_some_and(|timeout| begun.elapsed() >= timeout) => {
-                    return Ok(None);
-                }
-                None => {}
-            }
-        }
+        waiting::next(options.timeout, |wait| {
+            let found = socket.receive(wait).map_err(of_socket)?;
+            Ok(found.map(|(_, bytes)| bytes.to_vec()))
+        })
     })?;
     if socket.dropped() > 0 {
         say!("{} datagrams were dropped: they came faster than their rows could be written", socket.dropped());

@@ -17,6 +17,7 @@ mod links;
 mod live;
 mod long;
 mod many;
+mod meanings;
 mod node;
 mod numbers;
 mod outputs;

@@ -73,7 +73,7 @@ fn completions_and_manual_are_generated() {
         assert!(text(&good(&folder, &["generate", shell], b"")).contains("rows-per-block"));
     }
     assert!(text(&good(&folder, &["generate", "man"], b"")).starts_with(".ie"));
-    good(&folder, &["generate", "man", "--folder", "."], b"");
+    good(&folder, &["generate", "man", "--folder", "man"], b"");
     for page in [
         "fewbits.1",
         "fewbits-track.1",
@@ -83,6 +83,6 @@ fn completions_and_manual_are_generated() {
         "fewbits-design.1",
         "fewbits-pack.1",
     ] {
-        assert!(folder.join(page).is_file(), "{page}");
+        assert!(folder.join("man").join(page).is_file(), "{page}");
     }
 }

@@ -17,6 +17,7 @@ mod parquet;
 mod plain;
 mod random;
 mod recordings;
+mod refused;
 mod spellings;
 mod strangers;
 mod times;

@@ -214,3 +214,14 @@ fn pages_that_disagree_with_their_checksum_are_refused() {
         assert!(read.is_err(), "bit {bit}");
     }
 }
+
+#[test]
+fn columns_without_rows_keep_their_times() {
+    let columns: Vec<(&str, ArrayRef)> = vec![
+        ("t", Arc::new(TimestampMillisecondArray::from(Vec::<i64>::new()))),
+        ("v", Arc::new(Float64Array::from(Vec::<f64>::new()))),
+    ];
+    let mut table = open(file(columns, Compression::UNCOMPRESSED));
+    assert!(table.find_time().unwrap());
+    assert_eq!(table.survey().unwrap().rows, 0);
+}

@@ -1,0 +1,76 @@
+//! Lines of receivers and of logs. They have times and numbers, but are no tables: the refusal says how to make one of them.
+
+use crate::error::Error;
+use crate::guess;
+use crate::head::Head;
+
+/// The refusal of NMEA sentences and of lines of a log; `None` if the first lines are neither.
+pub(crate) fn refusal(head: &Head) -> Option<Error> {
+    let lines: Vec<&str> = head
+        .lines
+        .iter()
+        .map(|(_, line)| line.trim())
+        .filter(|line| !line.is_empty())
+        .collect();
+    let sentences: Vec<&str> = lines.iter().filter_map(|line| sentence(line)).collect();
+    if 2 * sentences.len() > lines.len() {
+        let has = |kind: &str| sentences.iter().any(|found| found.ends_with(kind));
+        let mend = if has("RMC") {
+            "make a table of one kind of them: (echo utc,status,lat,ns,lon,ew,knots,course,date; grep RMC, FILE | sed 's/.*RMC,//' | cut -d, -f1-9) \
+             | fewbits ... - --time-column date,utc --time-format '%d%m%y %H%M%S%.f'"
+        } else if has("GGA") {
+            "make a table of one kind of them: (echo utc,lat,ns,lon,ew,fix,satellites,hdop,altitude; grep GGA, FILE | sed 's/.*GGA,//' | cut -d, -f1-9) \
+             | fewbits ... -"
+        } else {
+            "make a table of one kind of them, as of the first: (echo NAMES; grep VTG, FILE | sed 's/.*VTG,//; s/[*].*//') | fewbits ... -"
+        };
+        return Some(Error::Format {
+            what: "NMEA 0183, sentences of several kinds",
+            mend,
+        });
+    }
+    lines.first().and_then(|line| logged(line))
+}
+
+/// Talker and kind of a sentence, as `GPGGA` of `$GPGGA,123519,...`; other cells may stand in front.
+fn sentence(line: &str) -> Option<&str> {
+    let begin = line.rfind(['$', '!'])? + 1;
+    let (name, _) = line.get(begin..)?.split_once(',')?;
+    let is_name = name.len() >= 5 && name.bytes().all(|c| c.is_ascii_uppercase() || c.is_ascii_digit());
+    is_name.then_some(name)
+}
+
+/// The refusal of a line `time host program[number]: text`, with a priority in front or not.
+fn logged(line: &str) -> Option<Error> {
+    const WHAT: &str = "a log, in which times and values stand among words";
+    let (priority, rest) = match line.strip_prefix('<').and_then(|rest| rest.split_once('>')) {
+        Some((digits, rest)) if !digits.is_empty() && digits.bytes().all(|c| c.is_ascii_digit()) => (true, rest),
+        _ => (false, line),
+    };
+    let mut words = rest.split_whitespace();
+    let mut first = words.next()?;
+    if priority && first.bytes().all(|c| c.is_ascii_digit()) {
+        first = words.next()?;
+    }
+    let has_year = guess::looks_like_time(first);
+    if !has_year {
+        let is_month = first.len() == 3 && first.bytes().all(|c| c.is_ascii_alphabetic());
+        let is_day = words.next()?.parse::<u8>().is_ok();
+        let is_clock = words.next()?.split(':').count() == 3;
+        if !(is_month && is_day && is_clock) {
+            return None;
+        }
+    }
+    let is_tagged = words.nth(1).is_some_and(|tag| tag.ends_with(':'));
+    if !is_tagged && !priority {
+        return None;
+    }
+    let mend = if has_year {
+        "take these out, as of temp=20.5: (echo time,temp; sed -nE 's/^(<[0-9]+>[0-9]* *)?([^ ]+) .*temp=([-+0-9.]+).*/\\2,\\3/p' FILE) | \
+         fewbits ... -"
+    } else {
+        "take these out, with the year, as of temp=20.5: (echo time,temp; sed -nE 's/^(<[0-9]+>)?([A-Z][a-z]+) +([0-9]+) ([0-9:.]+) \
+         .*temp=([-+0-9.]+).*/\\3 \\2 2026 \\4,\\5/p' FILE) | fewbits ... -"
+    };
+    Some(Error::Format { what: WHAT, mend })
+}
