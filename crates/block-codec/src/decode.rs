@@ -6,7 +6,7 @@ use crate::head::{Coding, Head};
 use crate::indices::{from_pco_bytes, from_wrapped_pco, raw_samples, read_block};
 use crate::rows::Others;
 use crate::sections::SECTIONS;
-use crate::{BlockCodec, Error, check_rows, learned, levels, stored};
+use crate::{BlockCodec, Error, check_rows, levels, stored};
 
 impl BlockCodec {
     /// The samples of a block of `rows` rows.
@@ -43,8 +43,7 @@ impl BlockCodec {
         let others = joint_columns(&head, others)?;
         let keys = match head.coding {
             Coding::Levels => Some(levels::read(rest, rows, others.as_ref())?),
-            Coding::TabledLevels => Some(levels::read_tabled(rest, rows, learned::read)?),
-            Coding::StoredLevels => Some(levels::read_tabled(rest, rows, stored::read)?),
+            Coding::StoredLevels => Some(levels::read_tabled(rest, rows)?),
             _ => None,
         };
         let Some(grid) = head.grid else {
@@ -59,7 +58,6 @@ impl BlockCodec {
             Coding::Models => read_block(rest, true, &grid, rows, others.as_ref())?,
             Coding::Wrapped => from_wrapped_pco::<i64>(rest, rows)?,
             Coding::Counts => read_block(rest, false, &grid, rows, None)?,
-            Coding::Tables => learned::read(rest, rows)?,
             Coding::Stored => stored::read(rest, rows)?,
             _ => match keys {
                 Some(keys) => keys.into_iter().map(levels::index_of_key).collect(),

@@ -6,13 +6,13 @@
 //! ```
 
 use crate::bytes::{Bytes, push_varint};
-use crate::head::{SAMPLES, STORED, TABLED};
+use crate::head::SAMPLES;
 use crate::vectors::vectorised_narrow;
 use crate::{BlockCodec, Error};
 use fewbits_node::elementary::log2;
 
-/// The first bytes of a block of sections.
-pub(crate) const SECTIONS: [u8; 2] = [SAMPLES | 128, TABLED | STORED];
+/// The first bytes of a block of sections. No head has these two flags in its second byte.
+pub(crate) const SECTIONS: [u8; 2] = [SAMPLES | 128, 0xc0];
 
 /// Rows of a piece, at whose ends sections may end.
 const PIECE: usize = 2048;

@@ -26,12 +26,12 @@
 mod alphabet;
 mod lane;
 mod lanes;
-pub(crate) mod order;
+mod order;
 mod plan;
 #[cfg(test)]
 mod tests;
 mod weights;
-pub(crate) mod words;
+mod words;
 
 use crate::arithmetic::{Coder, Reader, Writer};
 use crate::bytes::{Bytes, push_varint};
