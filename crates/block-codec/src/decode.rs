@@ -1,9 +1,10 @@
 //! Decoding of blocks.
 
+use crate::arithmetic::Reader;
 use crate::bytes::Bytes;
 use crate::error::Damaged;
 use crate::head::{Coding, Head};
-use crate::indices::{from_pco_bytes, from_wrapped_pco, raw_samples, read_block};
+use crate::indices::{code_block, from_pco_bytes, from_wrapped_pco, raw_samples};
 use crate::rows::Others;
 use crate::sections::SECTIONS;
 use crate::{BlockCodec, Error, check_rows, levels, stored};
@@ -42,7 +43,7 @@ impl BlockCodec {
         let rest = bytes.0;
         let others = joint_columns(&head, others)?;
         let keys = match head.coding {
-            Coding::Levels => Some(levels::read(rest, rows, others.as_ref())?),
+            Coding::Levels => Some(Reader::all(rest, |coder| levels::code(coder, true, None, rows, others.as_ref()))?),
             Coding::StoredLevels => Some(levels::read_tabled(rest, rows)?),
             _ => None,
         };
@@ -55,9 +56,11 @@ impl BlockCodec {
             });
         };
         let indices = match head.coding {
-            Coding::Models => read_block(rest, true, &grid, rows, others.as_ref())?,
+            Coding::Models | Coding::Counts => {
+                let by_models = head.coding == Coding::Models;
+                Reader::all(rest, |coder| code_block(coder, by_models, &grid, None, rows, others.as_ref()))?
+            }
             Coding::Wrapped => from_wrapped_pco::<i64>(rest, rows)?,
-            Coding::Counts => read_block(rest, false, &grid, rows, None)?,
             Coding::Stored => stored::read(rest, rows)?,
             _ => match keys {
                 Some(keys) => keys.into_iter().map(levels::index_of_key).collect(),

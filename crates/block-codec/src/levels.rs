@@ -19,7 +19,7 @@ use crate::arithmetic::{Coder, Reader, Writer};
 use crate::bytes::{Bytes, push_varint};
 use crate::counts::{Count, gamma};
 use crate::error::Damaged;
-use crate::indices::{Rest, code_rest};
+use crate::indices::code_rest;
 use crate::rows::Others;
 use crate::stored::{self, Plan};
 
@@ -170,7 +170,7 @@ fn code_levels<C: Coder>(coder: &mut C, wanted: Option<&[u64]>, rows: usize) -> 
 }
 
 /// Codes the keys of all rows: `wanted` at the writer, `None` at the reader.
-fn code<C: Coder>(
+pub(crate) fn code<C: Coder>(
     coder: &mut C,
     by_models: bool,
     wanted: Option<&(Vec<u64>, Vec<i64>)>,
@@ -183,7 +183,7 @@ fn code<C: Coder>(
     let first = wanted.map_or(0, |(_, numbers)| numbers[0] as u64);
     let first = coder.raw(first, u64::BITS - highest.leading_zeros()) as i64;
     let numbers = wanted.map(|(_, numbers)| numbers.as_slice());
-    let numbers = code_rest(coder, Rest::new(by_models, false), None, first, numbers, rows, others)?;
+    let numbers = code_rest(coder, by_models.then_some(false), None, first, numbers, rows, others)?;
     let level = |number: &i64| {
         usize::try_from(*number)
             .ok()
@@ -204,9 +204,7 @@ pub(crate) fn write(
     wanted: &(Vec<u64>, Vec<i64>),
     others: Option<&Others<'_>>,
 ) -> Result<Vec<u8>, Damaged> {
-    let mut writer = Writer::new(head);
-    code(&mut writer, by_models, Some(wanted), wanted.1.len(), others)?;
-    Ok(writer.finish())
+    Writer::all(head, |coder| code(coder, by_models, Some(wanted), wanted.1.len(), others))
 }
 
 /// Appends the code of keys with these levels, and tables for their numbers, to the head of a block.
@@ -215,9 +213,7 @@ pub(crate) fn write_tabled(
     (levels, numbers): &(Vec<u64>, Vec<i64>),
     plan: &Plan,
 ) -> Result<Vec<u8>, Damaged> {
-    let mut writer = Writer::default();
-    code_levels(&mut writer, Some(levels), numbers.len())?;
-    let list = writer.finish();
+    let list = Writer::all(Vec::new(), |coder| code_levels(coder, Some(levels), numbers.len()))?;
     push_varint(&mut head, list.len() as u64);
     head.extend_from_slice(&list);
     stored::write(numbers, plan, head)
@@ -227,21 +223,11 @@ pub(crate) fn write_tabled(
 pub(crate) fn read_tabled(bytes: &[u8], rows: usize) -> Result<Vec<u64>, Damaged> {
     let mut bytes = Bytes(bytes);
     let length = bytes.count(usize::MAX, "length of levels")?;
-    let mut reader = Reader::new(bytes.take(length)?);
-    let levels = code_levels(&mut reader, None, rows)?;
-    reader.finish()?;
+    let levels = Reader::all(bytes.take(length)?, |coder| code_levels(coder, None, rows))?;
     let numbers = stored::read(bytes.0, rows)?;
     let level = |number: i64| usize::try_from(number).ok().and_then(|number| levels.get(number));
     let levels = numbers.into_iter().map(|number| level(number).copied());
     levels.collect::<Option<_>>().ok_or_else(beyond_the_list)
-}
-
-/// The keys of all rows.
-pub(crate) fn read(bytes: &[u8], rows: usize, others: Option<&Others<'_>>) -> Result<Vec<u64>, Damaged> {
-    let mut reader = Reader::new(bytes);
-    let keys = code(&mut reader, true, None, rows, others)?;
-    reader.finish()?;
-    Ok(keys)
 }
 
 #[cfg(test)]
@@ -282,8 +268,9 @@ mod tests {
             };
             for by_models in [true, false] {
                 let bytes = write(vec![], by_models, &found, None).unwrap();
-                assert_eq!(read(&bytes, keys.len(), None).unwrap(), keys);
-                assert!(read(&bytes[..bytes.len() - 1], keys.len(), None).is_err());
+                let read = |bytes: &[u8]| Reader::all(bytes, |coder| code(coder, true, None, keys.len(), None));
+                assert_eq!(read(&bytes).unwrap(), keys);
+                assert!(read(&bytes[..bytes.len() - 1]).is_err());
             }
         }
         assert!(levels([1, 2, 3, 4].into_iter(), Effort::Thorough).is_none());

@@ -41,6 +41,7 @@ mod experts;
 mod fast;
 pub mod frame;
 mod grid;
+mod groups;
 mod head;
 mod indices;
 mod lanes;

@@ -6,6 +6,7 @@
 //! ```
 
 use crate::bytes::{Bytes, push_varint};
+use crate::groups::joined;
 use crate::head::SAMPLES;
 use crate::vectors::vectorised_narrow;
 use crate::{BlockCodec, Error};
@@ -84,26 +85,12 @@ fn class(step: i64) -> usize {
 pub(crate) fn sections(numbers: &[i64]) -> Vec<usize> {
     vectorised_narrow(
         #[inline(always)]
-        || of(numbers),
+        || {
+            let pieces = numbers.chunks(PIECE).map(Group::of).collect();
+            let groups = joined(pieces, |group| group.bits, -BITS_OF_SECTION, Group::joined);
+            groups.iter().map(|group| group.rows).collect()
+        },
     )
-}
-
-#[inline(always)]
-fn of(numbers: &[i64]) -> Vec<usize> {
-    let mut groups: Vec<Group> = numbers.chunks(PIECE).map(Group::of).collect();
-    let mut joined: Vec<Group> = groups.windows(2).map(|pair| pair[0].joined(&pair[1])).collect();
-    loop {
-        let lost = |at: usize| joined[at].bits - groups[at].bits - groups[at + 1].bits;
-        let best = (0..joined.len()).min_by(|a, b| lost(*a).total_cmp(&lost(*b)));
-        let Some(at) = best.filter(|at| lost(*at) < BITS_OF_SECTION) else {
-            return groups.iter().map(|group| group.rows).collect();
-        };
-        groups[at] = joined.remove(at);
-        groups.remove(at + 1);
-        for place in at.saturating_sub(1)..(at + 1).min(joined.len()) {
-            joined[place] = groups[place].joined(&groups[place + 1]);
-        }
-    }
 }
 
 impl BlockCodec {

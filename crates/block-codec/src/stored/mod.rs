@@ -146,10 +146,10 @@ pub(crate) fn write(indices: &[i64], plan: &Plan, mut bytes: Vec<u8>) -> Result<
         #[inline(always)]
         || Tables::of(&counts),
     );
-    let mut writer = Writer::default();
-    Start::code(&mut writer, Some(start))?;
-    let tables = Tables::code(&mut writer, Some(tables))?;
-    let stored = writer.finish();
+    let stored = Writer::all(Vec::new(), |writer| {
+        Start::code(writer, Some(start))?;
+        Tables::code(writer, Some(&tables))
+    })?;
     let coded = symbols.encoded(&tables, &differences, low);
     let head = (coded.words.len() as u64 % 4) << PAD_BITS | coded.pads;
     push_varint(&mut bytes, (stored.len() as u64) << HEAD_BITS | head);
@@ -167,10 +167,8 @@ pub(crate) fn read(bytes: &[u8], rows: usize) -> Result<Vec<i64>, Damaged> {
     let mut bytes = Bytes(bytes);
     let head = bytes.varint()?;
     let stored = bytes.take(usize::try_from(head >> HEAD_BITS).unwrap_or(usize::MAX))?;
-    let mut reader = Reader::new(stored);
-    let start = Start::code(&mut reader, None)?;
-    let tables = Tables::code(&mut reader, None)?;
-    reader.finish()?;
+    let (start, tables) =
+        Reader::all(stored, |reader| Ok::<_, Damaged>((Start::code(reader, None)?, Tables::code(reader, None)?)))?;
     let is_of_values = matches!(start.order, Order::Values { .. });
     let block = Block {
         start,
