@@ -2,7 +2,7 @@
 
 use crate::arithmetic::Reader;
 use crate::bytes::Bytes;
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use crate::head::{Coding, Head};
 use crate::indices::{code_block, from_pco_bytes, from_wrapped_pco, raw_samples};
 use crate::rows::Others;
@@ -77,8 +77,7 @@ impl BlockCodec {
 
 /// The other columns of a joint block.
 fn joint_columns<'a>(head: &Head<'_>, others: &[&'a [f64]]) -> Result<Option<Others<'a>>, Damaged> {
-    if head.joint && others.is_empty() {
-        return Err(Damaged::new("block", "joint", "the other columns that it was written with"));
-    }
+    let expected = "the other columns that it was written with";
+    ensure!(!head.joint || !others.is_empty(), Damaged::new("block", "joint", expected));
     Ok(head.joint.then(|| Others::new(others)))
 }

@@ -6,7 +6,7 @@ use crate::head::{Coding, SAMPLES};
 use crate::indices::{smallest_pco, write_block};
 use crate::rows::Others;
 use crate::stored::STORED_ROWS;
-use crate::vectors::vectorised;
+use crate::vectors::wide;
 use crate::{BlockCodec, Effort, Error, check_rows, levels};
 use std::borrow::Cow;
 
@@ -197,21 +197,18 @@ impl BlockCodec {
         let mut indices = Vec::with_capacity(samples.len());
         let mut last = None;
         // Instructions that round are among the vector instructions.
-        vectorised(
-            #[inline(always)]
-            || {
-                for (row, sample) in samples.iter().enumerate() {
-                    let near = last.unwrap_or(0);
-                    let index = grid.index(*sample, near);
-                    match index {
-                        Some(index) if self.is_within(grid.value(index), *sample) => last = Some(index),
-                        _ => exceptions.push((row, *sample)),
-                    }
-                    // Exceptions before the first ordinary sample: its index is not known yet.
-                    indices.push(last);
+        wide!({
+            for (row, sample) in samples.iter().enumerate() {
+                let near = last.unwrap_or(0);
+                let index = grid.index(*sample, near);
+                match index {
+                    Some(index) if self.is_within(grid.value(index), *sample) => last = Some(index),
+                    _ => exceptions.push((row, *sample)),
                 }
-            },
-        );
+                // Exceptions before the first ordinary sample: its index is not known yet.
+                indices.push(last);
+            }
+        });
         let first = indices.iter().find_map(|index| *index).unwrap_or(0);
         (indices.into_iter().map(|index| index.unwrap_or(first)).collect(), exceptions)
     }

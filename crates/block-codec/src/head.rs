@@ -2,7 +2,7 @@
 
 use crate::BlockCodec;
 use crate::bytes::{Bytes, Fields};
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use crate::grid::{DECIMALS, Grid, PHASES};
 use std::borrow::Cow;
 
@@ -92,9 +92,7 @@ impl BlockCodec {
         (kind, flags): (u8, u8),
     ) -> Result<Grid, Damaged> {
         let form = flags & (STEPS | SINGLE);
-        if form != 0 && (kind >= DECIMALS || form == SINGLE) {
-            return Err(Damaged::new("grid", kind, "decimals with steps"));
-        }
+        ensure!(form == 0 || (kind < DECIMALS && form != SINGLE), Damaged::new("grid", kind, "decimals with steps"));
         let grid = match (kind, self.period) {
             (0..DECIMALS, _) if form != 0 => {
                 let (unit, origin) = match own {
@@ -125,9 +123,7 @@ impl BlockCodec {
                 if flags & ANCHOR != 0 {
                     anchor = fields.f64(anchor)?;
                 }
-                if !anchor.is_finite() {
-                    return Err(Damaged::new("anchor", anchor, "a finite number"));
-                }
+                ensure!(anchor.is_finite(), Damaged::new("anchor", anchor, "a finite number"));
                 Grid::line(self.delta, anchor)
             }
             (CIRCLE, Some(period)) => Grid::circle(self.delta, period),
@@ -179,9 +175,7 @@ impl BlockCodec {
             for i in 0..count as usize {
                 let (row, sample) = own.exceptions.get(i).copied().unwrap_or((next, 0.0));
                 let row = fields.count(row - next, usize::MAX, "exception")?.saturating_add(next);
-                if row >= rows {
-                    return Err(Damaged::new("exception", row, "a row of the block"));
-                }
+                ensure!(row < rows, Damaged::new("exception", row, "a row of the block"));
                 exceptions.push((row, fields.f64(sample)?));
                 next = row + 1;
             }

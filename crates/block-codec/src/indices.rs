@@ -3,7 +3,7 @@
 use crate::arithmetic::{Coder, Writer};
 use crate::bytes::{unzigzag, zigzag};
 use crate::counts::Counts;
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use crate::grid::Grid;
 use crate::model::Model;
 use crate::rows::{LARGEST, Others, code_all};
@@ -37,9 +37,7 @@ pub(crate) fn code_first<C: Coder>(coder: &mut C, wanted: Option<i64>, rests: bo
     let rests = told >= WITH_RESTS;
     let length = if rests { told - WITH_RESTS } else { told };
     let first = unzigzag(coder.raw(z, length));
-    if first.unsigned_abs() > LARGEST as u64 {
-        return Err(Damaged::new("first index", first, "at most 2^46 in size"));
-    }
+    ensure!(first.unsigned_abs() <= LARGEST as u64, Damaged::new("first index", first, "at most 2^46 in size"));
     Ok((first, rests))
 }
 
@@ -74,9 +72,7 @@ pub(crate) fn code_block<C: Coder>(
 ) -> Result<Vec<i64>, Damaged> {
     let first = wanted.and_then(|indices| indices.first().copied());
     let (first, rests) = code_first(coder, first, by_models && rows >= RESTS_ROWS)?;
-    if rests && !by_models {
-        return Err(Damaged::new("first index", "too long", "at most 2^46 in size"));
-    }
+    ensure!(by_models || !rests, Damaged::new("first index", "too long", "at most 2^46 in size"));
     code_rest(coder, by_models.then_some(rests), grid.cells(), first, wanted, rows, others)
 }
 
@@ -147,9 +143,7 @@ pub(crate) fn smallest_pco<T: Number>(numbers: &[T], shortest: usize) -> Result<
 
 /// Numbers of [`to_wrapped_pco`]. Nothing may follow them.
 pub(crate) fn from_wrapped_pco<T: Number + Default>(bytes: &[u8], rows: usize) -> Result<Vec<T>, Damaged> {
-    if rows > MOST_ROWS {
-        return Err(from_pco(format!("{rows} rows")));
-    }
+    ensure!(rows <= MOST_ROWS, from_pco(format!("{rows} rows")));
     let (file, rest) = wrapped::FileDecompressor::new(bytes).map_err(from_pco)?;
     let (mut chunk, rest) = file.chunk_decompressor::<T, _>(rest).map_err(from_pco)?;
     let mut page = chunk.page_decompressor(rest, rows).map_err(from_pco)?;
@@ -168,9 +162,8 @@ pub(crate) fn from_wrapped_pco<T: Number + Default>(bytes: &[u8], rows: usize) -
 
 pub(crate) fn raw_samples(bytes: &[u8], rows: usize) -> Result<Vec<f64>, Damaged> {
     let (samples, rest) = bytes.as_chunks::<8>();
-    if samples.len() != rows || !rest.is_empty() {
-        return Err(Damaged::new("block", format!("{} bytes", bytes.len()), "8 bytes per row"));
-    }
+    let given = || format!("{} bytes", bytes.len());
+    ensure!(samples.len() == rows && rest.is_empty(), Damaged::new("block", given(), "8 bytes per row"));
     Ok(samples.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
 }
 
@@ -180,9 +173,7 @@ pub(crate) fn from_pco_bytes<T: Number + Default>(bytes: &[u8], rows: usize) -> 
     let (file, mut rest) = FileDecompressor::new(bytes).map_err(from_pco)?;
     while let DecompressorItem::Chunk(mut chunk) = file.chunk_decompressor::<T, _>(rest).map_err(from_pco)? {
         let (start, count) = (numbers.len(), chunk.n());
-        if count > rows - start {
-            return Err(from_pco(format!("{count} rows more")));
-        }
+        ensure!(count <= rows - start, from_pco(format!("{count} rows more")));
         numbers.resize(start + count, T::default());
         chunk.read(&mut numbers[start..]).map_err(from_pco)?;
         rest = chunk.into_src();

@@ -18,7 +18,7 @@ use crate::Effort;
 use crate::arithmetic::{Coder, Reader, Writer};
 use crate::bytes::{Bytes, push_varint};
 use crate::counts::{Count, gamma};
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use crate::indices::code_rest;
 use crate::rows::Others;
 use crate::stored::{self, Plan};
@@ -130,9 +130,7 @@ fn is_dense(levels: &[u64]) -> bool {
 /// Codes the list of levels: `wanted` at the writer, `None` at the reader.
 fn code_levels<C: Coder>(coder: &mut C, wanted: Option<&[u64]>, rows: usize) -> Result<Vec<u64>, Damaged> {
     let count = gamma(coder, wanted.map_or(1, |levels| levels.len() as u64))?;
-    if count > rows as u64 {
-        return Err(Damaged::new("levels", count, "at most one per row"));
-    }
+    ensure!(count <= rows as u64, Damaged::new("levels", count, "at most one per row"));
     let mut level = coder.raw(wanted.map_or(0, |levels| levels[0]), 64);
     let distances = || {
         wanted
@@ -153,9 +151,7 @@ fn code_levels<C: Coder>(coder: &mut C, wanted: Option<&[u64]>, rows: usize) -> 
             node = 2 * node + usize::from(up);
         }
         let length = (node & 127) as u32;
-        if !(1..=64).contains(&length) {
-            return Err(Damaged::new("distance of levels", length, "1 to 64 bits"));
-        }
+        ensure!((1..=64).contains(&length), Damaged::new("distance of levels", length, "1 to 64 bits"));
         before = length as usize;
         let distance = 1 << (length - 1) | coder.raw(wanted & !(1 << (length - 1)), length - 1);
         let next = distance.checked_shl(zeros).filter(|next| next >> zeros == distance);

@@ -92,9 +92,7 @@ impl BlockCodec {
     /// If `bound` is not above 0 or `2 bound` not finite.
     pub fn new(bound: f64) -> Result<Self, Error> {
         ArgumentError::positive("bound", bound)?;
-        if !(2.0 * bound).is_finite() {
-            return Err(ArgumentError::new("bound", bound, "a number whose double is finite").into());
-        }
+        ensure!((2.0 * bound).is_finite(), "bound", bound, "a number whose double is finite");
         Ok(Self {
             delta: bound,
             ..Self::lossless()
@@ -111,9 +109,7 @@ impl BlockCodec {
         if self.is_lossless() {
             return Ok(self);
         }
-        if period / self.delta > MOST_CELLS {
-            return Err(ArgumentError::new("period", period, "at most 2^40 times the bound").into());
-        }
+        ensure!(period / self.delta <= MOST_CELLS, "period", period, "at most 2^40 times the bound");
         Ok(Self {
             period: Some(period),
             ..self

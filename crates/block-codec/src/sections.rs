@@ -8,7 +8,7 @@
 use crate::bytes::{Bytes, push_varint};
 use crate::groups::joined;
 use crate::head::SAMPLES;
-use crate::vectors::vectorised_narrow;
+use crate::vectors::narrow;
 use crate::{BlockCodec, Error};
 use fewbits_node::elementary::log2;
 
@@ -83,14 +83,11 @@ fn class(step: i64) -> usize {
 
 /// The rows of each section; one section if the signal is of one kind.
 pub(crate) fn sections(numbers: &[i64]) -> Vec<usize> {
-    vectorised_narrow(
-        #[inline(always)]
-        || {
-            let pieces = numbers.chunks(PIECE).map(Group::of).collect();
-            let groups = joined(pieces, |group| group.bits, -BITS_OF_SECTION, Group::joined);
-            groups.iter().map(|group| group.rows).collect()
-        },
-    )
+    narrow!({
+        let pieces = numbers.chunks(PIECE).map(Group::of).collect();
+        let groups = joined(pieces, |group| group.bits, -BITS_OF_SECTION, Group::joined);
+        groups.iter().map(|group| group.rows).collect()
+    })
 }
 
 impl BlockCodec {

@@ -15,7 +15,7 @@
 use crate::arithmetic::{Coder, Reader, Writer};
 use crate::bytes::{Fields, unzigzag, zigzag};
 use crate::counts::gamma;
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use crate::grid::Grid;
 use crate::head::{PHASE, SINGLE, STEPS};
 use crate::indices::{RESTS_ROWS, code_rest};
@@ -117,9 +117,8 @@ impl BlockCodec {
         let grid = self.code_grid(fields, own.map(|start| &start.grid), form)?;
         let usual = fields.signed(own.map_or(0, |start| start.usual))?;
         let k = fields.byte(own.map_or(0, |start| start.k))?;
-        if usual.unsigned_abs() > LARGEST as u64 || k > MOST_BITS {
-            return Err(Damaged::new("usual index", usual, "at most 2^46 in size").into());
-        }
+        let is_small = usual.unsigned_abs() <= LARGEST as u64 && k <= MOST_BITS;
+        ensure!(is_small, Damaged::new("usual index", usual, "at most 2^46 in size"));
         let rests = head & RESTS != 0;
         Ok(Start { grid, usual, k, rests })
     }

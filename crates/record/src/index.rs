@@ -6,7 +6,7 @@
 
 use crate::aggregate::{self, Aggregate};
 use crate::block::Cells;
-use crate::error::Damage;
+use crate::error::{Damage, ensure};
 use crate::header::{Header, VERSION_5};
 use crate::wire::{Bytes, Fields, checked, read_checked, unzigzag, zigzag};
 
@@ -142,9 +142,7 @@ pub(crate) fn max_content(kind: u8, header: &Header) -> usize {
 /// Kind, content and whole length of the special record at the front, which begins with 0.
 pub(crate) fn read_special<'a>(header: &Header, bytes: &'a [u8]) -> Result<(u8, &'a [u8], usize), Damage> {
     let [mark, kind] = Bytes(bytes).array()?;
-    if mark != 0 {
-        return Err(Damage::NoBlock);
-    }
+    ensure!(mark == 0, Damage::NoBlock);
     let limit = max_content(kind, header);
     let (content, whole) = read_checked(header.check, bytes, 2, 0..=limit)?;
     Ok((kind, content, whole))

@@ -2,7 +2,7 @@
 
 use crate::append::{self, Append};
 use crate::block;
-use crate::error::Error;
+use crate::error::{Error, ensure};
 use crate::header::{Header, VERSION_5};
 use crate::index::{self, BLOCKS_PER_SEGMENT, BlockInfo, Segment};
 use crate::playback::{self, Index};
@@ -37,9 +37,7 @@ pub(crate) fn open(path: &Path) -> Result<Opened, Error> {
         .open(path)
         .map_err(Error::io("open"))?;
     append::lock(&file)?;
-    if !is_still_there(&file, path) {
-        return Err(Error::Locked);
-    }
+    ensure!(is_still_there(&file, path), Error::Locked);
     let mut scanner = Scanner::default();
     let (header, single) = scanner.header(&mut file)?;
     if single.is_some() || header.version == VERSION_5 {

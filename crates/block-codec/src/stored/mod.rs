@@ -35,10 +35,10 @@ mod words;
 
 use crate::arithmetic::{Coder, Reader, Writer};
 use crate::bytes::{Bytes, push_varint};
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use crate::indices::code_first;
 use crate::rows::{LARGEST, damaged};
-use crate::vectors::vectorised_narrow;
+use crate::vectors::narrow;
 use lane::{FIRST, Lane, SECOND, VALUES};
 use lanes::Symbols;
 use order::Order;
@@ -134,18 +134,12 @@ pub(crate) fn write(indices: &[i64], plan: &Plan, mut bytes: Vec<u8>) -> Result<
         tail,
     };
     let stretched = start.stretched(rows);
-    let symbols = vectorised_narrow(
-        #[inline(always)]
-        || match order {
-            Order::Values { .. } => Symbols::new::<true>(&mut differences, stretched, low),
-            _ => Symbols::new::<false>(&mut differences, stretched, low),
-        },
-    );
+    let symbols = narrow!(match order {
+        Order::Values { .. } => Symbols::new::<true>(&mut differences, stretched, low),
+        _ => Symbols::new::<false>(&mut differences, stretched, low),
+    });
     let counts = symbols.counts();
-    let tables = vectorised_narrow(
-        #[inline(always)]
-        || Tables::of(&counts),
-    );
+    let tables = narrow!(Tables::of(&counts));
     let stored = Writer::all(Vec::new(), |writer| {
         Start::code(writer, Some(start))?;
         Tables::code(writer, Some(&tables))
@@ -161,9 +155,7 @@ pub(crate) fn write(indices: &[i64], plan: &Plan, mut bytes: Vec<u8>) -> Result<
 
 /// The indices of a block of [`write`], without its head.
 pub(crate) fn read(bytes: &[u8], rows: usize) -> Result<Vec<i64>, Damaged> {
-    if rows < STORED_ROWS {
-        return Err(Damaged::new("block", format!("tables for {rows} rows"), "1024 rows or more"));
-    }
+    ensure!(rows >= STORED_ROWS, Damaged::new("block", format!("tables for {rows} rows"), "1024 rows or more"));
     let mut bytes = Bytes(bytes);
     let head = bytes.varint()?;
     let stored = bytes.take(usize::try_from(head >> HEAD_BITS).unwrap_or(usize::MAX))?;
@@ -201,10 +193,7 @@ impl Block {
         let mut found = [0; LANES * STRETCH];
         for length in stretches(self.start.stretched(rows - 1)) {
             let found = &mut found[..LANES * length];
-            vectorised_narrow(
-                #[inline(always)]
-                || self.stretch::<LOW_BITS, ORDER>(&mut words, &mut states, found),
-            );
+            narrow!(self.stretch::<LOW_BITS, ORDER>(&mut words, &mut states, found));
             words.check(&states)?;
             for found in found.chunks(length) {
                 self.push::<ORDER>(&mut indices, found)?;

@@ -18,7 +18,7 @@ use super::alphabet::{CONTEXTS, ESCAPE, SYMBOLS, ZERO, next_context};
 use super::words::fill_slots;
 use crate::arithmetic::Coder;
 use crate::counts::Count;
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use crate::groups::joined;
 use fewbits_node::elementary::log2;
 
@@ -139,9 +139,7 @@ impl Tables {
             let own = wanted.map(|tables| &tables.weights[table]);
             weights.push(weight_coder.code(coder, own, weights.last(), sizes));
         }
-        if coder.overran() {
-            return Err(Damaged::new("tables", "cut off", "a weight for each symbol"));
-        }
+        ensure!(!coder.overran(), Damaged::new("tables", "cut off", "a weight for each symbol"));
         Ok(Self {
             sizes,
             table_of,

@@ -5,7 +5,7 @@
 //! shifted out. Afterwards a state below `LOW` takes the next word at its lower end. A writer does the inverse from the last step to the first.
 
 use crate::bytes::Bytes;
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use std::hint::select_unpredictable;
 
 /// Lanes that are coded side by side.
@@ -90,18 +90,14 @@ impl<'a> Words<'a> {
 
     /// Checks what four stretches leave, so that time and memory are in proportion to the bytes.
     pub(super) fn check(&self, states: &[u32; LANES]) -> Result<(), Damaged> {
-        if self.broken || states.iter().any(|state| *state < LOW) {
-            return Err(cut_off());
-        }
+        ensure!(!self.broken && states.iter().all(|state| *state >= LOW), cut_off());
         Ok(())
     }
 
     /// The words of the tail: those that the states of the lanes 1 to 3 hold, and those that were not read.
     pub(super) fn late(&self, states: &[u32; LANES]) -> Result<Vec<[u8; 2]>, Damaged> {
         let held = &states[1..];
-        if held.iter().any(|state| *state >= 2 * LOW) {
-            return Err(cut_off());
-        }
+        ensure!(held.iter().all(|state| *state < 2 * LOW), cut_off());
         let rest = self.words[self.position..].iter().copied();
         Ok(held
             .iter()

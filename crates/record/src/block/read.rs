@@ -6,7 +6,7 @@ use super::{
 };
 use crate::bound::Bound;
 use crate::codec::{self, CodecId, Context, JOINT_COLUMNS};
-use crate::error::{Damage, Error};
+use crate::error::{Damage, Error, ensure};
 use crate::header::{Header, VERSION_5};
 use crate::specials::{self, Specials};
 use crate::time::{self, TimeKind};
@@ -100,9 +100,7 @@ pub(crate) fn decode_content(header: &Header, content: &[u8], wanted: impl Fn(us
     let mut descriptors: Vec<u8> = (0..columns).map(|i| plain(header, false, i)).collect();
     let mut specials = Vec::new();
     let Head { number, usual, flags } = read_head(header, &mut body)?;
-    if flags > 63 {
-        return Err(Damage::Content("flags"));
-    }
+    ensure!(flags <= 63, Damage::Content("flags"));
     // Without stored descriptors, columns have those of `plain`; apart, none is shared.
     if flags & APART != 0 {
         descriptors.fill(CodecId::Adaptive as u8);
@@ -113,9 +111,7 @@ pub(crate) fn decode_content(header: &Header, content: &[u8], wanted: impl Fn(us
         if flags & ROWS_FOLLOW != 0 {
             rows = body.count(rows, "number of rows")?;
         }
-        if rows == 0 {
-            return Err(Damage::Content("number of rows"));
-        }
+        ensure!(rows > 0, Damage::Content("number of rows"));
         let ticks = time::decode(TimeKind::from_bits(flags), &mut body, rows, &grid)?;
         if flags & DESCRIPTORS_FOLLOW != 0 {
             let has_own = body.take(columns.div_ceil(8))?;
@@ -198,14 +194,10 @@ fn read_section<'a>(
     descriptor: u8,
     has_length: bool,
 ) -> Result<Section<'a>, Damage> {
-    if descriptor & !DESCRIPTOR_BITS != 0 {
-        return Err(Damage::Content("descriptor"));
-    }
+    ensure!(descriptor & !DESCRIPTOR_BITS == 0, Damage::Content("descriptor"));
     let id = CodecId::from_byte(descriptor & 15)?;
     if id == CodecId::Shared {
-        if descriptor & !15 != 0 || header.start(column, None).is_none() {
-            return Err(Damage::Content("descriptor"));
-        }
+        ensure!(descriptor & !15 == 0 && header.start(column, None).is_some(), Damage::Content("descriptor"));
         let (own, others, bytes) = (None, Vec::new(), &body.0[..0]);
         return Ok(Section { id, own, others, bytes });
     }
@@ -214,15 +206,11 @@ fn read_section<'a>(
     } else {
         None
     };
-    if own == Some(0.0) {
-        return Err(Damage::Content("bound"));
-    }
+    ensure!(own != Some(0.0), Damage::Content("bound"));
     let mut others = Vec::new();
     if descriptor & OTHERS_FOLLOW != 0 {
         let count = usize::from(body.byte()?) + 1;
-        if count > JOINT_COLUMNS {
-            return Err(Damage::Content("number of other columns"));
-        }
+        ensure!(count <= JOINT_COLUMNS, Damage::Content("number of other columns"));
         for _ in 0..count {
             let back = body.count(column, "another column")?;
             others.push(
