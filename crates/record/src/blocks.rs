@@ -2,7 +2,7 @@
 
 use crate::block::{self, Block};
 use crate::error::{Damage, Error, ensure};
-use crate::index::{self, BlockInfo, Segment};
+use crate::index::{BlockInfo, Segment};
 use crate::playback::{Index, Playback, Row, entries, read_at};
 use crate::scan::{Order, Scanner};
 use std::io::{Read, Seek, SeekFrom};
@@ -101,14 +101,8 @@ impl<R: Read + Seek> Blocks<'_, R> {
         let chosen = &self.playback.chosen;
         let block = block::decode(header, &bytes, |column| chosen.contains(&column)).map_err(damaged)?;
         // Another block of the recording that was put here is not what the index describes, or has been read before.
-        let tolerance = header.schema.time.tolerance();
-        let is_near = |(first, last): (i64, i64)| {
-            first.abs_diff(entry.ticks.0) <= tolerance && last.abs_diff(entry.ticks.1) <= tolerance
-        };
-        let ends = index::ends_of(&block.ticks);
-        let is_described = block.rows() as u64 == entry.rows && ends.is_some_and(is_near);
         let is_next = block.number.is_none() || block.number > self.last_number;
-        ensure!(is_described && is_next, damaged(Damage::Misplaced));
+        ensure!(entry.describes(&block.ticks, header) && is_next, damaged(Damage::Misplaced));
         self.last_number = block.number;
         Ok(block)
     }

@@ -76,6 +76,17 @@ impl BlockInfo {
     }
 }
 
+impl BlockInfo {
+    /// Whether these may be the ticks of the block that this entry describes.
+    pub(crate) fn describes(&self, ticks: &[i64], header: &Header) -> bool {
+        let tolerance = header.schema.time.tolerance();
+        let is_near = |(first, last): (i64, i64)| {
+            first.abs_diff(self.ticks.0) <= tolerance && last.abs_diff(self.ticks.1) <= tolerance
+        };
+        ticks.len() as u64 == self.rows && ends_of(ticks).is_some_and(is_near)
+    }
+}
+
 /// The smallest and the largest of pairs of these.
 pub(crate) fn ends(pairs: impl Iterator<Item = (i64, i64)>) -> Option<(i64, i64)> {
     pairs.reduce(|(low, high), (first, last)| (low.min(first), high.max(last)))

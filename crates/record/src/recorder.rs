@@ -248,7 +248,7 @@ impl<W: Write> Recorder<W> {
         }
         self.write_header()?;
         // A single segment is also the footer.
-        let is_only = self.segments.is_empty() && !self.entries.is_empty();
+        let is_only = self.segments.is_empty() && (1..=BLOCKS_PER_SEGMENT).contains(&self.entries.len());
         self.write_segment(if is_only { index::ONLY } else { index::SEGMENT })?;
         let footer = match &self.header {
             Some(header) if !is_only => {
@@ -324,7 +324,7 @@ impl<W: Write> Recorder<W> {
         self.write(bytes)?;
         self.entries.push(entry);
         self.next_number += 1;
-        if self.entries.len() == BLOCKS_PER_SEGMENT {
+        if self.entries.len() >= BLOCKS_PER_SEGMENT {
             self.write_segment(index::SEGMENT)?;
         }
         Ok(())
@@ -347,7 +347,13 @@ impl<W: Write> Recorder<W> {
             return Ok(());
         }
         let header = self.header.as_ref().ok_or(Error::Broken)?;
-        let content = written(|fields| index::segment(fields, header, 0, &self.entries));
+        // Damage of which a resumed recording keeps the bytes may put more blocks between segments: a segment that lists none has them searched.
+        let listed = if self.entries.len() > BLOCKS_PER_SEGMENT {
+            &[]
+        } else {
+            self.entries.as_slice()
+        };
+        let content = written(|fields| index::segment(fields, header, 0, listed));
         let bytes = index::special(header.check, kind, &content);
         self.write(&bytes)?;
         self.segments.push(Segment::new(bytes.len() as u64, &self.entries));

@@ -1,7 +1,7 @@
 //! Decoding of a block.
 
 use super::{
-    APART, BOUND_FOLLOWS, Block, Cells, DESCRIPTOR_BITS, DESCRIPTORS_FOLLOW, OTHERS_FOLLOW, ROWS_FOLLOW,
+    APART, BOUND_FOLLOWS, Block, Cells, DESCRIPTOR_BITS, DESCRIPTORS_FOLLOW, NUMBERS, OTHERS_FOLLOW, ROWS_FOLLOW,
     SPECIALS_FOLLOW, aligned, plain, shared,
 };
 use crate::bound::Bound;
@@ -33,6 +33,7 @@ impl Head {
         let apart = u64::from(self.flags & APART != 0);
         let own = 4 * self.number.unwrap_or(0) + 2 * apart + u64::from(self.usual.is_none());
         let head = fields.varint(own)?;
+        ensure!(is_old || head >> 2 < NUMBERS, Damage::Content("number of a block"));
         let apart = (head >> 1 & 1) * APART;
         let has_flags = head & 1 == 1;
         let flags = match (has_flags, is_old) {
