@@ -1,6 +1,6 @@
 //! Integers as bytes, and a reader that cannot read beyond the end.
 
-use crate::error::ensure;
+use crate::ensure;
 
 /// Why a value could not be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
