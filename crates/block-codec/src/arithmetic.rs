@@ -124,7 +124,7 @@ impl Writer {
     ///
     /// # Errors
     /// Those of `describe`.
-    pub fn all<T, E>(bytes: Vec<u8>, describe: impl FnOnce(&mut Self) -> Result<T, E>) -> Result<Vec<u8>, E> {
+    pub(crate) fn all<T, E>(bytes: Vec<u8>, describe: impl FnOnce(&mut Self) -> Result<T, E>) -> Result<Vec<u8>, E> {
         let mut writer = Self::new(bytes);
         describe(&mut writer)?;
         Ok(writer.finish())
@@ -185,7 +185,10 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// Those of `describe`, and as [`finish`](Self::finish).
-    pub fn all<T, E: From<Damaged>>(bytes: &'a [u8], describe: impl FnOnce(&mut Self) -> Result<T, E>) -> Result<T, E> {
+    pub(crate) fn all<T, E: From<Damaged>>(
+        bytes: &'a [u8],
+        describe: impl FnOnce(&mut Self) -> Result<T, E>,
+    ) -> Result<T, E> {
         let mut reader = Self::new(bytes);
         let found = describe(&mut reader)?;
         reader.finish()?;

@@ -2,6 +2,7 @@
 
 /// Returns an error, as the function's own, unless a condition holds: of a name, a value and what is expected an [`ArgumentError`]. It is made only
 /// then.
+#[doc(hidden)]
 #[macro_export]
 macro_rules! ensure {
     ($holds:expr, $error:expr) => {
