@@ -120,6 +120,16 @@ impl Writer {
         8.0 * self.bytes.len() as f64 + 64.0 - (self.interval.width as f64).log2()
     }
 
+    /// The code of what `describe` codes, behind these bytes.
+    ///
+    /// # Errors
+    /// Those of `describe`.
+    pub(crate) fn all<T, E>(bytes: Vec<u8>, describe: impl FnOnce(&mut Self) -> Result<T, E>) -> Result<Vec<u8>, E> {
+        let mut writer = Self::new(bytes);
+        describe(&mut writer)?;
+        Ok(writer.finish())
+    }
+
     /// All bytes, with the shortest end.
     pub fn finish(mut self) -> Vec<u8> {
         let (end, count) = self.interval.end();
@@ -169,6 +179,20 @@ impl<'a> Reader<'a> {
         };
         (0..AHEAD).for_each(|_| reader.take());
         reader
+    }
+
+    /// What `describe` finds, if the bytes hold nothing else.
+    ///
+    /// # Errors
+    /// Those of `describe`, and as [`finish`](Self::finish).
+    pub(crate) fn all<T, E: From<Damaged>>(
+        bytes: &'a [u8],
+        describe: impl FnOnce(&mut Self) -> Result<T, E>,
+    ) -> Result<T, E> {
+        let mut reader = Self::new(bytes);
+        let found = describe(&mut reader)?;
+        reader.finish()?;
+        Ok(found)
     }
 
     #[inline(always)]

@@ -1,5 +1,7 @@
 //! Integers as bytes, and a reader that cannot read beyond the end.
 
+use crate::ensure;
+
 /// Why a value could not be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -81,9 +83,7 @@ impl<'a> Bytes<'a> {
         for shift in (0..64).step_by(7) {
             let byte = self.byte()?;
             let group = u64::from(byte & 0x7f);
-            if shift == 63 && group > 1 {
-                return Err(Unread::Content("integer"));
-            }
+            ensure!(shift < 63 || group <= 1, Unread::Content("integer"));
             value |= group << shift;
             if byte & 0x80 == 0 {
                 return Ok(value);

@@ -10,7 +10,7 @@
 //! A second set of counts given the last index was measured: 3 % fewer bits, but reading takes a third longer.
 
 use crate::arithmetic::Coder;
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use crate::rows::{JOINT_COLUMNS, LARGEST, State, damaged};
 
 /// Number of decisions in a context: zero, sign, and whether the size is at least 2 to 15.
@@ -146,9 +146,7 @@ impl State for Counts {
                 size = size.saturating_add(over - 1);
             }
             // No writer codes a larger difference of differences.
-            if size > (8 * LARGEST as u64) >> k {
-                return Err(damaged(i64::MAX));
-            }
+            ensure!(size <= (8 * LARGEST as u64) >> k, damaged(i64::MAX));
             // Arithmetic instead of a branch: both signs are equally frequent.
             (2 * i64::from(up) - 1) * size as i64
         };
@@ -173,9 +171,7 @@ pub(crate) fn gamma<C: Coder>(coder: &mut C, value: u64) -> Result<u64, Damaged>
     while coder.bit(1 << 15, bits < wanted) {
         bits += 1;
         // Differences of differences, the largest numbers, are at most 2^48 in size.
-        if bits > 48 {
-            return Err(damaged(i64::MAX));
-        }
+        ensure!(bits <= 48, damaged(i64::MAX));
     }
     Ok(1 << bits | coder.raw(value & ((1 << bits) - 1), bits))
 }

@@ -1,12 +1,13 @@
 //! Decoding of blocks.
 
+use crate::arithmetic::Reader;
 use crate::bytes::Bytes;
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use crate::head::{Coding, Head};
-use crate::indices::{from_pco_bytes, from_wrapped_pco, raw_samples, read_block};
+use crate::indices::{code_block, from_pco_bytes, from_wrapped_pco, raw_samples};
 use crate::rows::Others;
 use crate::sections::SECTIONS;
-use crate::{BlockCodec, Error, check_rows, learned, levels, stored};
+use crate::{BlockCodec, Error, check_rows, levels, stored};
 
 impl BlockCodec {
     /// The samples of a block of `rows` rows.
@@ -42,9 +43,8 @@ impl BlockCodec {
         let rest = bytes.0;
         let others = joint_columns(&head, others)?;
         let keys = match head.coding {
-            Coding::Levels => Some(levels::read(rest, rows, others.as_ref())?),
-            Coding::TabledLevels => Some(levels::read_tabled(rest, rows, learned::read)?),
-            Coding::StoredLevels => Some(levels::read_tabled(rest, rows, stored::read)?),
+            Coding::Levels => Some(Reader::all(rest, |coder| levels::code(coder, true, None, rows, others.as_ref()))?),
+            Coding::StoredLevels => Some(levels::read_tabled(rest, rows)?),
             _ => None,
         };
         let Some(grid) = head.grid else {
@@ -56,10 +56,11 @@ impl BlockCodec {
             });
         };
         let indices = match head.coding {
-            Coding::Models => read_block(rest, true, &grid, rows, others.as_ref())?,
+            Coding::Models | Coding::Counts => {
+                let by_models = head.coding == Coding::Models;
+                Reader::all(rest, |coder| code_block(coder, by_models, &grid, None, rows, others.as_ref()))?
+            }
             Coding::Wrapped => from_wrapped_pco::<i64>(rest, rows)?,
-            Coding::Counts => read_block(rest, false, &grid, rows, None)?,
-            Coding::Tables => learned::read(rest, rows)?,
             Coding::Stored => stored::read(rest, rows)?,
             _ => match keys {
                 Some(keys) => keys.into_iter().map(levels::index_of_key).collect(),
@@ -76,8 +77,7 @@ impl BlockCodec {
 
 /// The other columns of a joint block.
 fn joint_columns<'a>(head: &Head<'_>, others: &[&'a [f64]]) -> Result<Option<Others<'a>>, Damaged> {
-    if head.joint && others.is_empty() {
-        return Err(Damaged::new("block", "joint", "the other columns that it was written with"));
-    }
+    let expected = "the other columns that it was written with";
+    ensure!(!head.joint || !others.is_empty(), Damaged::new("block", "joint", expected));
     Ok(head.joint.then(|| Others::new(others)))
 }

@@ -1,11 +1,12 @@
 //! Encoding of blocks: the grids and codings that are tried.
 
+use crate::error::Damaged;
 use crate::grid::Grid;
 use crate::head::{Coding, SAMPLES};
 use crate::indices::{smallest_pco, write_block};
 use crate::rows::Others;
 use crate::stored::STORED_ROWS;
-use crate::vectors::vectorised;
+use crate::vectors::wide;
 use crate::{BlockCodec, Effort, Error, check_rows, levels};
 use std::borrow::Cow;
 
@@ -32,17 +33,15 @@ impl Shortest {
         }
     }
 
-    /// Keeps a list of levels, if there is one, behind these heads of blocks that are joint or not.
-    fn keep_levels(
+    /// Keeps a block without other columns and, if there are any, one with them.
+    fn keep_both(
         &mut self,
-        found: Option<(Vec<u64>, Vec<i64>)>,
-        head: impl Fn(bool) -> Vec<u8>,
         others: Option<&Others<'_>>,
-    ) -> Result<(), Error> {
-        let Some(found) = found else { return Ok(()) };
-        self.keep(levels::write(head(false), true, &found, None)?);
+        write: impl Fn(Option<&Others<'_>>) -> Result<Vec<u8>, Damaged>,
+    ) -> Result<(), Damaged> {
+        self.keep(write(None)?);
         if others.is_some() {
-            self.keep(levels::write(head(true), true, &found, others)?);
+            self.keep(write(others)?);
         }
         Ok(())
     }
@@ -93,8 +92,10 @@ impl BlockCodec {
                 best.keep([self.head(None, Coding::Wrapped, false, &[]), numbers].concat());
             }
             let keys = samples.iter().map(|sample| levels::key_of_sample(*sample));
-            let head = |joint| self.head(None, Coding::Levels, joint, &[]);
-            best.keep_levels(levels::levels(keys, self.effort), head, others.as_ref())?;
+            if let Some(found) = levels::levels(keys, self.effort) {
+                let head = |joint| self.head(None, Coding::Levels, joint, &[]);
+                best.keep_both(others.as_ref(), |others| levels::write(head(others.is_some()), true, &found, others))?;
+            }
             best.keep(raw(samples));
         }
         Ok(best.0.unwrap_or_default())
@@ -111,14 +112,16 @@ impl BlockCodec {
         let (indices, exceptions) = self.indices(grid, samples);
         let head = |coding, joint| self.head(Some(grid), coding, joint, &exceptions);
         let mut shortest = Shortest::default();
-        shortest.keep(write_block(head(Coding::Models, false), true, grid, &indices, None)?);
-        if others.is_some() {
-            shortest.keep(write_block(head(Coding::Models, true), true, grid, &indices, others)?);
-        }
+        shortest.keep_both(others, |others| {
+            write_block(head(Coding::Models, others.is_some()), true, grid, &indices, others)
+        })?;
         // On coarse grids the models need far fewer bits. Try the general coder only if a sample takes many bits.
         let is_fine = shortest.length() > FINE * samples.len() / 8;
         let keys = indices.iter().map(|index| levels::key_of_index(*index));
-        shortest.keep_levels(levels::levels(keys, self.effort), |joint| head(Coding::Levels, joint), others)?;
+        if let Some(found) = levels::levels(keys, self.effort) {
+            let head = |joint| head(Coding::Levels, joint);
+            shortest.keep_both(others, |others| levels::write(head(others.is_some()), true, &found, others))?;
+        }
         if is_fine && let Some(numbers) = smallest_pco(&indices, shortest.length().min(best.length()))? {
             shortest.keep([head(Coding::Wrapped, false), numbers].concat());
         }
@@ -194,21 +197,18 @@ impl BlockCodec {
         let mut indices = Vec::with_capacity(samples.len());
         let mut last = None;
         // Instructions that round are among the vector instructions.
-        vectorised(
-            #[inline(always)]
-            || {
-                for (row, sample) in samples.iter().enumerate() {
-                    let near = last.unwrap_or(0);
-                    let index = grid.index(*sample, near);
-                    match index {
-                        Some(index) if self.is_within(grid.value(index), *sample) => last = Some(index),
-                        _ => exceptions.push((row, *sample)),
-                    }
-                    // Exceptions before the first ordinary sample: its index is not known yet.
-                    indices.push(last);
+        wide!({
+            for (row, sample) in samples.iter().enumerate() {
+                let near = last.unwrap_or(0);
+                let index = grid.index(*sample, near);
+                match index {
+                    Some(index) if self.is_within(grid.value(index), *sample) => last = Some(index),
+                    _ => exceptions.push((row, *sample)),
                 }
-            },
-        );
+                // Exceptions before the first ordinary sample: its index is not known yet.
+                indices.push(last);
+            }
+        });
         let first = indices.iter().find_map(|index| *index).unwrap_or(0);
         (indices.into_iter().map(|index| index.unwrap_or(first)).collect(), exceptions)
     }

@@ -1,5 +1,22 @@
 //! Errors: arguments that are refused, and bytes that no writer wrote.
 
+/// Returns an error, as the function's own, unless a condition holds: of a name, a value and what is expected an [`ArgumentError`]. It is made only
+/// then.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! ensure {
+    ($holds:expr, $error:expr) => {
+        if $holds {
+        } else {
+            return Err($error.into());
+        }
+    };
+    ($holds:expr, $name:expr, $value:expr, $expected:expr) => {
+        $crate::ensure!($holds, $crate::ArgumentError::new($name, $value, $expected))
+    };
+}
+pub(crate) use ensure;
+
 /// An argument that a constructor or function does not accept. The message can be shown to a user as it stands.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("argument `{name}` is {value}: expected {expected}")]

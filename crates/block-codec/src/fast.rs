@@ -79,6 +79,15 @@ impl BlockCodec {
         })
     }
 
+    /// A list of levels behind the head of its coding.
+    fn encode_levels(&self, head: impl Fn(Coding) -> Vec<u8>, found: &Levels, plan: &Plan) -> Result<Vec<u8>, Error> {
+        Ok(if self.is_tabled(found.1.len()) {
+            levels::write_tabled(head(Coding::StoredLevels), found, plan)?
+        } else {
+            levels::write(head(Coding::Levels), false, found, None)?
+        })
+    }
+
     /// The samples without a grid.
     fn encode_samples(&self, samples: &[f64]) -> Result<Vec<u8>, Error> {
         let keys = samples.iter().map(|sample| levels::key_of_sample(*sample));
@@ -87,11 +96,7 @@ impl BlockCodec {
             Ok(is_shorter.then_some((found, plan)))
         });
         if let Some((found, plan)) = found.transpose()?.flatten() {
-            return Ok(if self.is_tabled(samples.len()) {
-                levels::write_tabled(self.head(None, Coding::StoredLevels, false, &[]), &found, &plan)?
-            } else {
-                levels::write(self.head(None, Coding::Levels, false, &[]), false, &found, None)?
-            });
+            return self.encode_levels(|coding| self.head(None, coding, false, &[]), &found, &plan);
         }
         let numbers = to_wrapped_pco(samples, &DeltaSpec::default(), LEVEL)?;
         Ok(numbers
@@ -139,10 +144,7 @@ impl BlockCodec {
                 other.filter(|other| other.len() < bytes.len()).unwrap_or(bytes)
             }
             Choice::Symbols(_) => counted()?,
-            Choice::Levels(found, plan) if is_tabled => {
-                levels::write_tabled(head(Coding::StoredLevels), &found, &plan)?
-            }
-            Choice::Levels(found, _) => levels::write(head(Coding::Levels), false, &found, None)?,
+            Choice::Levels(found, plan) => self.encode_levels(head, &found, &plan)?,
             Choice::Pco(order) => match to_wrapped_pco(indices, &DeltaSpec::TryConsecutive(order), LEVEL)? {
                 Some(numbers) => [head(Coding::Wrapped), numbers].concat(),
                 None => counted()?,

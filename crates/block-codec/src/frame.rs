@@ -26,7 +26,7 @@
 //! ```
 //! Numbers are little-endian. The bound is 0 in kinds without one. The checksum is that of Ethernet (CRC-32/ISO-HDLC).
 
-use crate::{ArgumentError, BlockCodec, Damaged, Effort, Error};
+use crate::{ArgumentError, BlockCodec, Damaged, Effort, Error, ensure};
 use std::borrow::Cow;
 
 const MAGIC: [u8; 3] = *b"fb\x01";
@@ -207,12 +207,8 @@ fn parts(frame: &[u8]) -> Result<Parts<'_>, Error> {
     let short = || damaged("of fewer than 24 bytes");
     let (rest, checksum) = frame.split_last_chunk::<4>().ok_or_else(short)?;
     let (head, content) = rest.split_first_chunk::<HEAD>().ok_or_else(short)?;
-    if head[..3] != MAGIC || head[3] > HALVES {
-        return Err(damaged("of another beginning"));
-    }
-    if crc32fast::hash(rest) != u32::from_le_bytes(*checksum) {
-        return Err(damaged("of another checksum"));
-    }
+    ensure!(head[..3] == MAGIC && head[3] <= HALVES, damaged("of another beginning"));
+    ensure!(crc32fast::hash(rest) == u32::from_le_bytes(*checksum), damaged("of another checksum"));
     let large = || damaged("of more rows than memory");
     let rows = usize::try_from(number(&head[12..20])).map_err(|_| large())?;
     // A few bytes may stand for any number of rows: memory that is not there must not end the program.

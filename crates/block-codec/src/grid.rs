@@ -1,7 +1,7 @@
 //! The grid of a block's reconstructions: conversion between samples and integers.
 
 use crate::Effort;
-use crate::vectors::{double, rounded, vectorised};
+use crate::vectors::{double, rounded, wide};
 use fewbits_node::adaptive::TENS;
 
 /// Largest sample as a decimal integer: sums of two are exact doubles.
@@ -55,17 +55,14 @@ const AT_ONCE: usize = 64;
 
 /// Whether every sample is a whole number divided by `ten`, to the last bit.
 fn have_digits(samples: &[f64], ten: f64) -> bool {
-    vectorised(
-        #[inline(always)]
-        || {
-            samples.chunks(AT_ONCE).all(|samples| {
-                samples.iter().fold(true, |all, sample| {
-                    let whole = rounded(sample * ten);
-                    all & (whole.abs() < LARGEST_DIGITS) & ((whole / ten).to_bits() == sample.to_bits())
-                })
+    wide!({
+        samples.chunks(AT_ONCE).all(|samples| {
+            samples.iter().fold(true, |all, sample| {
+                let whole = rounded(sample * ten);
+                all & (whole.abs() < LARGEST_DIGITS) & ((whole / ten).to_bits() == sample.to_bits())
             })
-        },
-    )
+        })
+    })
 }
 
 /// The integer `digits` with `sample == digits / ten` rounded to single precision, if there is one.
@@ -195,24 +192,21 @@ impl Grid {
             Effort::Fast => 1 << 13,
         };
         // Under phase `p` a sample is in cell `(place - p) / 16`, rounded down: for each phase, how often the cell changes.
-        let crossings = vectorised(
-            #[inline(always)]
-            || {
-                let mut crossings = [0_u32; PHASES as usize];
-                let (mut last, mut origin) = (0, None);
-                for sample in samples.iter().take(most).filter(|sample| sample.is_finite()) {
-                    let place = sample * scale + offset;
-                    let origin = *origin.get_or_insert_with(|| (place / phases).floor() * phases);
-                    // Shifted to positive numbers, for which a conversion rounds down.
-                    let place = ((place - origin).clamp(-FARTHEST_PLACE, FARTHEST_PLACE) + 2.0 * FARTHEST_PLACE) as i32;
-                    let before = std::mem::replace(&mut last, place);
-                    for (phase, crossings) in (0..).zip(&mut crossings) {
-                        *crossings += u32::from((place - phase) >> PHASE_BITS != (before - phase) >> PHASE_BITS);
-                    }
+        let crossings = wide!({
+            let mut crossings = [0_u32; PHASES as usize];
+            let (mut last, mut origin) = (0, None);
+            for sample in samples.iter().take(most).filter(|sample| sample.is_finite()) {
+                let place = sample * scale + offset;
+                let origin = *origin.get_or_insert_with(|| (place / phases).floor() * phases);
+                // Shifted to positive numbers, for which a conversion rounds down.
+                let place = ((place - origin).clamp(-FARTHEST_PLACE, FARTHEST_PLACE) + 2.0 * FARTHEST_PLACE) as i32;
+                let before = std::mem::replace(&mut last, place);
+                for (phase, crossings) in (0..).zip(&mut crossings) {
+                    *crossings += u32::from((place - phase) >> PHASE_BITS != (before - phase) >> PHASE_BITS);
                 }
-                crossings
-            },
-        );
+            }
+            crossings
+        });
         let best = (0..PHASES).min_by_key(|phase| crossings[usize::from(*phase)]);
         let best = best.unwrap_or(0);
         let saved = crossings[0] - crossings[usize::from(best)];
@@ -316,23 +310,17 @@ impl Grid {
             Self::Decimal { decimals, width, phase } if exact(WHOLE / (4 * width)) => {
                 let moved = (width - 1 + 2 * Self::digits_moved(width, phase)) as f64;
                 let (width, ten) = (width as f64, TENS[usize::from(decimals)]);
-                vectorised(
-                    #[inline(always)]
-                    || {
-                        let twice = indices.iter().map(|index| 2.0 * width * double(*index) + moved);
-                        twice.map(|twice| 0.5 * twice / ten).collect()
-                    },
-                )
+                wide!({
+                    let twice = indices.iter().map(|index| 2.0 * width * double(*index) + moved);
+                    twice.map(|twice| 0.5 * twice / ten).collect()
+                })
             }
             Self::Line { anchor, step, phase } if exact(LARGEST_DIGITS as i64) => {
                 let moved = f64::from(phase) / f64::from(PHASES);
-                vectorised(
-                    #[inline(always)]
-                    || {
-                        let values = indices.iter().map(|index| anchor + step * (double(*index) + moved));
-                        values.map(|value| value.clamp(f64::MIN, f64::MAX)).collect()
-                    },
-                )
+                wide!({
+                    let values = indices.iter().map(|index| anchor + step * (double(*index) + moved));
+                    values.map(|value| value.clamp(f64::MIN, f64::MAX)).collect()
+                })
             }
             _ => indices.iter().map(|index| self.value(*index)).collect(),
         }

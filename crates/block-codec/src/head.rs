@@ -2,7 +2,7 @@
 
 use crate::BlockCodec;
 use crate::bytes::{Bytes, Fields};
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use crate::grid::{DECIMALS, Grid, PHASES};
 use std::borrow::Cow;
 
@@ -11,16 +11,17 @@ pub(crate) const LINE: u8 = 13;
 pub(crate) const CIRCLE: u8 = 14;
 pub(crate) const SAMPLES: u8 = 15;
 
-/// Flags of the second byte: exceptions; steps; an anchor; a phase; decimals are rounded to single precision; pco is in its wrapped form; tables
-/// that learn follow the counts, or the list of levels; stored tables are in place of the counts, or follow the list of levels.
+/// Flags of the second byte: exceptions; steps; an anchor; a phase; decimals are rounded to single precision; pco is in its wrapped form; stored
+/// tables are in place of the counts, or follow the list of levels.
 const EXCEPTIONS: u8 = 1;
 pub(crate) const STEPS: u8 = 2;
 const ANCHOR: u8 = 4;
 pub(crate) const PHASE: u8 = 8;
 pub(crate) const SINGLE: u8 = 16;
 const WRAPPED: u8 = 32;
-pub(crate) const TABLED: u8 = 64;
-pub(crate) const STORED: u8 = 128;
+const STORED: u8 = 128;
+/// Flags of codings, of which one is free.
+const FORMS: u8 = 0xe0;
 
 /// How the indices are coded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,12 +30,8 @@ pub(crate) enum Coding {
     Pco,
     Raw,
     Counts,
-    /// Counts, then tables of symbols that learn. Not written.
-    Tables,
     /// A list of levels, and their numbers.
     Levels,
-    /// A list of levels, and tables that learn for their numbers. Not written.
-    TabledLevels,
     /// Tables of symbols that the block stores.
     Stored,
     /// A list of levels, and stored tables for their numbers.
@@ -49,17 +46,14 @@ const CODINGS: &[(Coding, u8, u8)] = &[
     (Coding::Pco, 1, 0),
     (Coding::Wrapped, 1, WRAPPED),
     (Coding::Levels, 2, 0),
-    (Coding::TabledLevels, 2, TABLED),
     (Coding::StoredLevels, 2, STORED),
     (Coding::Counts, 3, 0),
-    (Coding::Tables, 3, TABLED),
     (Coding::Stored, 3, STORED),
 ];
 
 /// The same of samples.
 const CODINGS_OF_SAMPLES: &[(Coding, u8, u8)] = &[
     (Coding::Levels, 0, 0),
-    (Coding::TabledLevels, 0, TABLED),
     (Coding::StoredLevels, 0, STORED),
     (Coding::Pco, 1, 0),
     (Coding::Raw, 2, 0),
@@ -98,9 +92,7 @@ impl BlockCodec {
         (kind, flags): (u8, u8),
     ) -> Result<Grid, Damaged> {
         let form = flags & (STEPS | SINGLE);
-        if form != 0 && (kind >= DECIMALS || form == SINGLE) {
-            return Err(Damaged::new("grid", kind, "decimals with steps"));
-        }
+        ensure!(form == 0 || (kind < DECIMALS && form != SINGLE), Damaged::new("grid", kind, "decimals with steps"));
         let grid = match (kind, self.period) {
             (0..DECIMALS, _) if form != 0 => {
                 let (unit, origin) = match own {
@@ -131,9 +123,7 @@ impl BlockCodec {
                 if flags & ANCHOR != 0 {
                     anchor = fields.f64(anchor)?;
                 }
-                if !anchor.is_finite() {
-                    return Err(Damaged::new("anchor", anchor, "a finite number"));
-                }
+                ensure!(anchor.is_finite(), Damaged::new("anchor", anchor, "a finite number"));
                 Grid::line(self.delta, anchor)
             }
             (CIRCLE, Some(period)) => Grid::circle(self.delta, period),
@@ -158,7 +148,7 @@ impl BlockCodec {
         let second = flags | form | u8::from(!own.exceptions.is_empty());
         let head = fields.byte(kind | bits << 4 | u8::from(own.joint) << 6 | u8::from(second != 0) << 7)?;
         let second = if head & 128 == 0 { 0 } else { fields.byte(second)? };
-        let (kind, joint, form) = (head & 15, head & 64 != 0, second & (WRAPPED | TABLED | STORED));
+        let (kind, joint, form) = (head & 15, head & 64 != 0, second & FORMS);
         let found = codings(kind)
             .iter()
             .find(|(_, bits, own)| (head >> 4 & 3, form) == (*bits, *own));
@@ -167,7 +157,7 @@ impl BlockCodec {
         };
         if (head & 128 != 0 && second == 0)
             || (kind == SAMPLES && (second != form || (joint && coding != Coding::Levels)))
-            || (joint && form & (TABLED | STORED) != 0)
+            || (joint && form == STORED)
         {
             return Err(Damaged::new(
                 "second byte",
@@ -185,9 +175,7 @@ impl BlockCodec {
             for i in 0..count as usize {
                 let (row, sample) = own.exceptions.get(i).copied().unwrap_or((next, 0.0));
                 let row = fields.count(row - next, usize::MAX, "exception")?.saturating_add(next);
-                if row >= rows {
-                    return Err(Damaged::new("exception", row, "a row of the block"));
-                }
+                ensure!(row < rows, Damaged::new("exception", row, "a row of the block"));
                 exceptions.push((row, fields.f64(sample)?));
                 next = row + 1;
             }

@@ -1,9 +1,9 @@
 //! Conversion of the indices of a block to bytes and back, in each of the codings.
 
-use crate::arithmetic::{Coder, Reader, Writer};
+use crate::arithmetic::{Coder, Writer};
 use crate::bytes::{unzigzag, zigzag};
 use crate::counts::Counts;
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use crate::grid::Grid;
 use crate::model::Model;
 use crate::rows::{LARGEST, Others, code_all};
@@ -37,49 +37,43 @@ pub(crate) fn code_first<C: Coder>(coder: &mut C, wanted: Option<i64>, rests: bo
     let rests = told >= WITH_RESTS;
     let length = if rests { told - WITH_RESTS } else { told };
     let first = unzigzag(coder.raw(z, length));
-    if first.unsigned_abs() > LARGEST as u64 {
-        return Err(Damaged::new("first index", first, "at most 2^46 in size"));
-    }
+    ensure!(first.unsigned_abs() <= LARGEST as u64, Damaged::new("first index", first, "at most 2^46 in size"));
     Ok((first, rests))
 }
 
-/// How the indices after the first one are coded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Rest {
-    /// Models, whose contexts have the lengths of rests or not.
-    Models {
-        rests: bool,
-    },
-    Counts,
-}
-
-impl Rest {
-    pub(crate) fn new(by_models: bool, rests: bool) -> Self {
-        if by_models {
-            Self::Models { rests }
-        } else {
-            Self::Counts
-        }
-    }
-}
-
-/// Codes the indices after the first one (on a circle of so many `cells`, if there is one) by models, or by counts with one bit in front. Counts do not use `others`.
+/// Codes the indices after the first one (on a circle of so many `cells`, if there is one) by models, whose contexts have the lengths of `rests` or
+/// not, or if `rests` is `None` by counts with one bit in front. Counts do not use `others`.
 pub(crate) fn code_rest<C: Coder>(
     coder: &mut C,
-    coding: Rest,
+    rests: Option<bool>,
     cells: Option<i64>,
     first: i64,
     wanted: Option<&[i64]>,
     rows: usize,
     others: Option<&Others<'_>>,
 ) -> Result<Vec<i64>, Damaged> {
-    if let Rest::Models { rests } = coding {
+    if let Some(rests) = rests {
         let model = Model::new(rows, first, cells, others.is_some(), rests);
         return code_all(coder, model, wanted, rows, others);
     }
     // The reader does not know the indices in advance: whether differences of differences are smaller is told.
     let second = coder.raw(u64::from(wanted.is_some_and(Counts::prefers_second)), 1) == 1;
     code_all(coder, Counts::new(first, second), wanted, rows, None)
+}
+
+/// Codes the indices of a block without a start by models or by counts: `wanted` at the writer, `None` at the reader.
+pub(crate) fn code_block<C: Coder>(
+    coder: &mut C,
+    by_models: bool,
+    grid: &Grid,
+    wanted: Option<&[i64]>,
+    rows: usize,
+    others: Option<&Others<'_>>,
+) -> Result<Vec<i64>, Damaged> {
+    let first = wanted.and_then(|indices| indices.first().copied());
+    let (first, rests) = code_first(coder, first, by_models && rows >= RESTS_ROWS)?;
+    ensure!(by_models || !rests, Damaged::new("first index", "too long", "at most 2^46 in size"));
+    code_rest(coder, by_models.then_some(rests), grid.cells(), first, wanted, rows, others)
 }
 
 /// Appends the code of these indices by models or by counts to the head of a block.
@@ -91,30 +85,7 @@ pub(crate) fn write_block(
     others: Option<&Others<'_>>,
 ) -> Result<Vec<u8>, Damaged> {
     bytes.reserve(64 + indices.len() / 2);
-    let mut writer = Writer::new(bytes);
-    let rests = by_models && indices.len() >= RESTS_ROWS;
-    let (first, rests) = code_first(&mut writer, Some(indices.first().copied().unwrap_or(0)), rests)?;
-    let rest = Rest::new(by_models, rests);
-    code_rest(&mut writer, rest, grid.cells(), first, Some(indices), indices.len(), others)?;
-    Ok(writer.finish())
-}
-
-/// The indices of a block of [`write_block`], without its head.
-pub(crate) fn read_block(
-    bytes: &[u8],
-    by_models: bool,
-    grid: &Grid,
-    rows: usize,
-    others: Option<&Others<'_>>,
-) -> Result<Vec<i64>, Damaged> {
-    let mut reader = Reader::new(bytes);
-    let (first, rests) = code_first(&mut reader, None, false)?;
-    if rests && !by_models {
-        return Err(Damaged::new("first index", "too long", "at most 2^46 in size"));
-    }
-    let indices = code_rest(&mut reader, Rest::new(by_models, rests), grid.cells(), first, None, rows, others)?;
-    reader.finish()?;
-    Ok(indices)
+    Writer::all(bytes, |coder| code_block(coder, by_models, grid, Some(indices), indices.len(), others))
 }
 
 /// Orders of differences that are tried besides the one that pco chooses, which is bad for few distinct indices.
@@ -172,9 +143,7 @@ pub(crate) fn smallest_pco<T: Number>(numbers: &[T], shortest: usize) -> Result<
 
 /// Numbers of [`to_wrapped_pco`]. Nothing may follow them.
 pub(crate) fn from_wrapped_pco<T: Number + Default>(bytes: &[u8], rows: usize) -> Result<Vec<T>, Damaged> {
-    if rows > MOST_ROWS {
-        return Err(from_pco(format!("{rows} rows")));
-    }
+    ensure!(rows <= MOST_ROWS, from_pco(format!("{rows} rows")));
     let (file, rest) = wrapped::FileDecompressor::new(bytes).map_err(from_pco)?;
     let (mut chunk, rest) = file.chunk_decompressor::<T, _>(rest).map_err(from_pco)?;
     let mut page = chunk.page_decompressor(rest, rows).map_err(from_pco)?;
@@ -193,9 +162,8 @@ pub(crate) fn from_wrapped_pco<T: Number + Default>(bytes: &[u8], rows: usize) -
 
 pub(crate) fn raw_samples(bytes: &[u8], rows: usize) -> Result<Vec<f64>, Damaged> {
     let (samples, rest) = bytes.as_chunks::<8>();
-    if samples.len() != rows || !rest.is_empty() {
-        return Err(Damaged::new("block", format!("{} bytes", bytes.len()), "8 bytes per row"));
-    }
+    let given = || format!("{} bytes", bytes.len());
+    ensure!(samples.len() == rows && rest.is_empty(), Damaged::new("block", given(), "8 bytes per row"));
     Ok(samples.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
 }
 
@@ -205,9 +173,7 @@ pub(crate) fn from_pco_bytes<T: Number + Default>(bytes: &[u8], rows: usize) -> 
     let (file, mut rest) = FileDecompressor::new(bytes).map_err(from_pco)?;
     while let DecompressorItem::Chunk(mut chunk) = file.chunk_decompressor::<T, _>(rest).map_err(from_pco)? {
         let (start, count) = (numbers.len(), chunk.n());
-        if count > rows - start {
-            return Err(from_pco(format!("{count} rows more")));
-        }
+        ensure!(count <= rows - start, from_pco(format!("{count} rows more")));
         numbers.resize(start + count, T::default());
         chunk.read(&mut numbers[start..]).map_err(from_pco)?;
         rest = chunk.into_src();

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! With tables the arithmetic code has the list alone (from "number of levels" to "distances"). In front of it stands its length in bytes, a
-//! varint; behind it are the numbers of all rows as in module `stored` (`learned` in blocks that say so).
+//! varint; behind it are the numbers of all rows as in module `stored`.
 //!
 //! A level is an index of the block's grid, or a sample itself; both are mapped to unsigned integers of the same order.
 
@@ -18,8 +18,8 @@ use crate::Effort;
 use crate::arithmetic::{Coder, Reader, Writer};
 use crate::bytes::{Bytes, push_varint};
 use crate::counts::{Count, gamma};
-use crate::error::Damaged;
-use crate::indices::{Rest, code_rest};
+use crate::error::{Damaged, ensure};
+use crate::indices::code_rest;
 use crate::rows::Others;
 use crate::stored::{self, Plan};
 
@@ -130,9 +130,7 @@ fn is_dense(levels: &[u64]) -> bool {
 /// Codes the list of levels: `wanted` at the writer, `None` at the reader.
 fn code_levels<C: Coder>(coder: &mut C, wanted: Option<&[u64]>, rows: usize) -> Result<Vec<u64>, Damaged> {
     let count = gamma(coder, wanted.map_or(1, |levels| levels.len() as u64))?;
-    if count > rows as u64 {
-        return Err(Damaged::new("levels", count, "at most one per row"));
-    }
+    ensure!(count <= rows as u64, Damaged::new("levels", count, "at most one per row"));
     let mut level = coder.raw(wanted.map_or(0, |levels| levels[0]), 64);
     let distances = || {
         wanted
@@ -153,9 +151,7 @@ fn code_levels<C: Coder>(coder: &mut C, wanted: Option<&[u64]>, rows: usize) -> 
             node = 2 * node + usize::from(up);
         }
         let length = (node & 127) as u32;
-        if !(1..=64).contains(&length) {
-            return Err(Damaged::new("distance of levels", length, "1 to 64 bits"));
-        }
+        ensure!((1..=64).contains(&length), Damaged::new("distance of levels", length, "1 to 64 bits"));
         before = length as usize;
         let distance = 1 << (length - 1) | coder.raw(wanted & !(1 << (length - 1)), length - 1);
         let next = distance.checked_shl(zeros).filter(|next| next >> zeros == distance);
@@ -170,7 +166,7 @@ fn code_levels<C: Coder>(coder: &mut C, wanted: Option<&[u64]>, rows: usize) -> 
 }
 
 /// Codes the keys of all rows: `wanted` at the writer, `None` at the reader.
-fn code<C: Coder>(
+pub(crate) fn code<C: Coder>(
     coder: &mut C,
     by_models: bool,
     wanted: Option<&(Vec<u64>, Vec<i64>)>,
@@ -183,7 +179,7 @@ fn code<C: Coder>(
     let first = wanted.map_or(0, |(_, numbers)| numbers[0] as u64);
     let first = coder.raw(first, u64::BITS - highest.leading_zeros()) as i64;
     let numbers = wanted.map(|(_, numbers)| numbers.as_slice());
-    let numbers = code_rest(coder, Rest::new(by_models, false), None, first, numbers, rows, others)?;
+    let numbers = code_rest(coder, by_models.then_some(false), None, first, numbers, rows, others)?;
     let level = |number: &i64| {
         usize::try_from(*number)
             .ok()
@@ -204,9 +200,7 @@ pub(crate) fn write(
     wanted: &(Vec<u64>, Vec<i64>),
     others: Option<&Others<'_>>,
 ) -> Result<Vec<u8>, Damaged> {
-    let mut writer = Writer::new(head);
-    code(&mut writer, by_models, Some(wanted), wanted.1.len(), others)?;
-    Ok(writer.finish())
+    Writer::all(head, |coder| code(coder, by_models, Some(wanted), wanted.1.len(), others))
 }
 
 /// Appends the code of keys with these levels, and tables for their numbers, to the head of a block.
@@ -215,37 +209,21 @@ pub(crate) fn write_tabled(
     (levels, numbers): &(Vec<u64>, Vec<i64>),
     plan: &Plan,
 ) -> Result<Vec<u8>, Damaged> {
-    let mut writer = Writer::default();
-    code_levels(&mut writer, Some(levels), numbers.len())?;
-    let list = writer.finish();
+    let list = Writer::all(Vec::new(), |coder| code_levels(coder, Some(levels), numbers.len()))?;
     push_varint(&mut head, list.len() as u64);
     head.extend_from_slice(&list);
     stored::write(numbers, plan, head)
 }
 
-/// The keys of all rows of a block of [`write_tabled`], whose numbers `read` reads.
-pub(crate) fn read_tabled(
-    bytes: &[u8],
-    rows: usize,
-    read: fn(&[u8], usize) -> Result<Vec<i64>, Damaged>,
-) -> Result<Vec<u64>, Damaged> {
+/// The keys of all rows of a block of [`write_tabled`].
+pub(crate) fn read_tabled(bytes: &[u8], rows: usize) -> Result<Vec<u64>, Damaged> {
     let mut bytes = Bytes(bytes);
     let length = bytes.count(usize::MAX, "length of levels")?;
-    let mut reader = Reader::new(bytes.take(length)?);
-    let levels = code_levels(&mut reader, None, rows)?;
-    reader.finish()?;
-    let numbers = read(bytes.0, rows)?;
+    let levels = Reader::all(bytes.take(length)?, |coder| code_levels(coder, None, rows))?;
+    let numbers = stored::read(bytes.0, rows)?;
     let level = |number: i64| usize::try_from(number).ok().and_then(|number| levels.get(number));
     let levels = numbers.into_iter().map(|number| level(number).copied());
     levels.collect::<Option<_>>().ok_or_else(beyond_the_list)
-}
-
-/// The keys of all rows.
-pub(crate) fn read(bytes: &[u8], rows: usize, others: Option<&Others<'_>>) -> Result<Vec<u64>, Damaged> {
-    let mut reader = Reader::new(bytes);
-    let keys = code(&mut reader, true, None, rows, others)?;
-    reader.finish()?;
-    Ok(keys)
 }
 
 #[cfg(test)]
@@ -286,8 +264,9 @@ mod tests {
             };
             for by_models in [true, false] {
                 let bytes = write(vec![], by_models, &found, None).unwrap();
-                assert_eq!(read(&bytes, keys.len(), None).unwrap(), keys);
-                assert!(read(&bytes[..bytes.len() - 1], keys.len(), None).is_err());
+                let read = |bytes: &[u8]| Reader::all(bytes, |coder| code(coder, true, None, keys.len(), None));
+                assert_eq!(read(&bytes).unwrap(), keys);
+                assert!(read(&bytes[..bytes.len() - 1]).is_err());
             }
         }
         assert!(levels([1, 2, 3, 4].into_iter(), Effort::Thorough).is_none());

@@ -8,7 +8,7 @@
 //! ```
 
 use crate::arithmetic::Coder;
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use crate::experts::{Frequencies, LeastSquares, Tails, Tracks};
 use crate::lanes::Lanes;
 use crate::mixer::Mixer;
@@ -275,9 +275,7 @@ impl Model {
         let mut far;
         let (mut begin, mut width, mut count) = (1_i64, 1_i64, 0_usize);
         loop {
-            if begin + width > LARGEST >> grid.k << 2 {
-                return Err(damaged(i64::MAX));
-            }
+            ensure!(begin + width <= LARGEST >> grid.k << 2, damaged(i64::MAX));
             let node = MAGNITUDES + 2 * count.min(18) as u32 + u32::from(up);
             self.mixer.look_up(node, CLASS_MAGNITUDES + count.min(3));
             let edge = grid.edge(begin + width, up);

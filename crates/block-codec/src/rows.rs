@@ -1,7 +1,7 @@
 //! The loop over rows that writer and reader share, for any coder of indices.
 
 use crate::arithmetic::Coder;
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use crate::vectors::vectorised_narrow;
 
 /// Largest size of an index: sums of a few fit into an `i64`.
@@ -82,9 +82,7 @@ pub(crate) fn code_all<C: Coder, S: State>(
                 let steps = others.map_or([0.0; JOINT_COLUMNS], |others| others.at(row));
                 let index = state.code(&mut own, wanted.map(|wanted| wanted[row]), steps)?;
                 // Larger ones, which only damaged bytes contain, could overflow the sums of the state.
-                if index.abs() > LARGEST {
-                    return Err(damaged(index));
-                }
+                ensure!(index.abs() <= LARGEST, damaged(index));
                 state.learn(index);
                 indices.push(index);
                 if own.overran() {

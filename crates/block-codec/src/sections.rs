@@ -6,13 +6,14 @@
 //! ```
 
 use crate::bytes::{Bytes, push_varint};
-use crate::head::{SAMPLES, STORED, TABLED};
-use crate::vectors::vectorised_narrow;
+use crate::groups::joined;
+use crate::head::SAMPLES;
+use crate::vectors::narrow;
 use crate::{BlockCodec, Error};
 use fewbits_node::elementary::log2;
 
-/// The first bytes of a block of sections.
-pub(crate) const SECTIONS: [u8; 2] = [SAMPLES | 128, TABLED | STORED];
+/// The first bytes of a block of sections. No head has these two flags in its second byte.
+pub(crate) const SECTIONS: [u8; 2] = [SAMPLES | 128, 0xc0];
 
 /// Rows of a piece, at whose ends sections may end.
 const PIECE: usize = 2048;
@@ -82,28 +83,11 @@ fn class(step: i64) -> usize {
 
 /// The rows of each section; one section if the signal is of one kind.
 pub(crate) fn sections(numbers: &[i64]) -> Vec<usize> {
-    vectorised_narrow(
-        #[inline(always)]
-        || of(numbers),
-    )
-}
-
-#[inline(always)]
-fn of(numbers: &[i64]) -> Vec<usize> {
-    let mut groups: Vec<Group> = numbers.chunks(PIECE).map(Group::of).collect();
-    let mut joined: Vec<Group> = groups.windows(2).map(|pair| pair[0].joined(&pair[1])).collect();
-    loop {
-        let lost = |at: usize| joined[at].bits - groups[at].bits - groups[at + 1].bits;
-        let best = (0..joined.len()).min_by(|a, b| lost(*a).total_cmp(&lost(*b)));
-        let Some(at) = best.filter(|at| lost(*at) < BITS_OF_SECTION) else {
-            return groups.iter().map(|group| group.rows).collect();
-        };
-        groups[at] = joined.remove(at);
-        groups.remove(at + 1);
-        for place in at.saturating_sub(1)..(at + 1).min(joined.len()) {
-            joined[place] = groups[place].joined(&groups[place + 1]);
-        }
-    }
+    narrow!({
+        let pieces = numbers.chunks(PIECE).map(Group::of).collect();
+        let groups = joined(pieces, |group| group.bits, -BITS_OF_SECTION, Group::joined);
+        groups.iter().map(|group| group.rows).collect()
+    })
 }
 
 impl BlockCodec {

@@ -15,10 +15,10 @@
 use crate::arithmetic::{Coder, Reader, Writer};
 use crate::bytes::{Fields, unzigzag, zigzag};
 use crate::counts::gamma;
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use crate::grid::Grid;
 use crate::head::{PHASE, SINGLE, STEPS};
-use crate::indices::{RESTS_ROWS, Rest, code_rest};
+use crate::indices::{RESTS_ROWS, code_rest};
 use crate::rows::{LARGEST, Others};
 use crate::{BlockCodec, Effort, Error, check_rows};
 
@@ -79,37 +79,28 @@ impl Start {
 impl BlockCodec {
     /// The start for blocks of samples like these; `None` if no grid fits them.
     pub fn start(&self, samples: &[f64]) -> Option<Start> {
-        let grid = match self.grid(samples)? {
-            Grid::Line { step, .. } => Grid::Line {
-                anchor: 0.0,
-                step,
-                phase: 0,
-            },
-            grid => grid,
+        let mut grid = self.grid(samples)?;
+        if let Grid::Line { anchor, .. } = &mut grid {
+            *anchor = 0.0;
         }
-        .fitted(samples, self.effort);
+        let grid = grid.fitted(samples, self.effort);
         let (mut indices, _) = self.indices(&grid, samples);
         // The median has the smallest mean distance from the indices.
         indices.sort_unstable();
         let usual = indices[indices.len() / 2];
         let sizes: u128 = indices.iter().map(|index| u128::from(zigzag(index - usual))).sum();
         let mean = (sizes / indices.len() as u128) as u64;
+        // On a circle all first indices are equally likely. Elsewhere the mean distance is below `2^k`, so the high bits are mostly zero.
+        let (usual, k) = match grid.cells() {
+            Some(cells) => (0, cells.ilog2()),
+            None => (usual, (u64::BITS - mean.leading_zeros()).min(u32::from(MOST_BITS))),
+        };
         let rests = samples.len() >= RESTS_ROWS;
-        Some(match grid.cells() {
-            // On a circle all first indices are equally likely.
-            Some(cells) => Start {
-                grid,
-                usual: 0,
-                k: cells.ilog2() as u8,
-                rests,
-            },
-            // The mean distance is below `2^k`, so the high bits are mostly zero.
-            None => Start {
-                grid,
-                usual,
-                k: (u64::BITS - mean.leading_zeros()).min(u32::from(MOST_BITS)) as u8,
-                rests,
-            },
+        Some(Start {
+            grid,
+            usual,
+            k: k as u8,
+            rests,
         })
     }
 
@@ -126,9 +117,8 @@ impl BlockCodec {
         let grid = self.code_grid(fields, own.map(|start| &start.grid), form)?;
         let usual = fields.signed(own.map_or(0, |start| start.usual))?;
         let k = fields.byte(own.map_or(0, |start| start.k))?;
-        if usual.unsigned_abs() > LARGEST as u64 || k > MOST_BITS {
-            return Err(Damaged::new("usual index", usual, "at most 2^46 in size").into());
-        }
+        let is_small = usual.unsigned_abs() <= LARGEST as u64 && k <= MOST_BITS;
+        ensure!(is_small, Damaged::new("usual index", usual, "at most 2^46 in size"));
         let rests = head & RESTS != 0;
         Ok(Start { grid, usual, k, rests })
     }
@@ -219,17 +209,16 @@ impl BlockCodec {
     ) -> Result<Vec<i64>, Damaged> {
         let by_models = coder.bit(BY_MODELS, self.effort == Effort::Thorough);
         let first = start.first_index(coder, wanted.and_then(|wanted| wanted.first().copied()))?;
-        code_rest(coder, Rest::new(by_models, start.rests), start.grid.cells(), first, wanted, rows, others)
+        code_rest(coder, by_models.then_some(start.rests), start.grid.cells(), first, wanted, rows, others)
     }
 
     fn started(&self, start: &Start, indices: &[i64], others: Option<&Others<'_>>) -> Result<StartedBlock, Damaged> {
-        let mut writer = Writer::new(Vec::with_capacity(64 + indices.len() / 2));
-        writer.bit(WITH_START, true);
-        self.code(&mut writer, start, Some(indices), indices.len(), others)?;
-        Ok(StartedBlock {
-            bytes: writer.finish(),
-            joint: others.is_some(),
-        })
+        let bytes = Writer::all(Vec::with_capacity(64 + indices.len() / 2), |writer| {
+            writer.bit(WITH_START, true);
+            self.code(writer, start, Some(indices), indices.len(), others)
+        })?;
+        let joint = others.is_some();
+        Ok(StartedBlock { bytes, joint })
     }
 
     /// The samples of a block of [`encode_from`](Self::encode_from) with the same start, and with the other columns if it is joint.
@@ -242,10 +231,10 @@ impl BlockCodec {
             return self.decode_with(bytes.get(1..).unwrap_or_default(), rows, others);
         }
         let others = (!others.is_empty()).then(|| Others::new(others));
-        let mut reader = Reader::new(bytes);
-        reader.bit(WITH_START, true);
-        let indices = self.code(&mut reader, start, None, rows, others.as_ref())?;
-        reader.finish()?;
+        let indices = Reader::all(bytes, |reader| {
+            reader.bit(WITH_START, true);
+            self.code(reader, start, None, rows, others.as_ref())
+        })?;
         Ok(start.values(&indices))
     }
 }

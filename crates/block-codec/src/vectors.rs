@@ -1,5 +1,26 @@
 //! Loops compiled for the vector instructions of this machine. The results have the same bits at every width.
 
+/// What an expression gives, compiled as with [`vectorised`].
+macro_rules! wide {
+    ($work:expr) => {
+        $crate::vectors::vectorised(
+            #[inline(always)]
+            || $work,
+        )
+    };
+}
+
+/// As [`wide`], with [`vectorised_narrow`].
+macro_rules! narrow {
+    ($work:expr) => {
+        $crate::vectors::vectorised_narrow(
+            #[inline(always)]
+            || $work,
+        )
+    };
+}
+pub(crate) use {narrow, wide};
+
 /// Runs `work`, compiled for the widest vector instructions of this machine. Give the closure `#[inline(always)]`.
 #[inline(always)]
 pub(crate) fn vectorised<R>(work: impl FnOnce() -> R) -> R {

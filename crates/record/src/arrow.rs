@@ -9,7 +9,7 @@
 //! | any other | `time`: 64-bit integers, ticks; metadata `decimals` |
 
 use crate::block::{Block, Cells};
-use crate::error::{Error, listed};
+use crate::error::{Error, ensure, listed};
 use crate::integers::Integers;
 use crate::recorder::Recorder;
 use crate::schema::{Schema, TimeBase, TimeFormat};
@@ -198,9 +198,7 @@ fn codes(name: &str, array: &dyn Array, integers: Integers) -> Result<Cells, Err
 /// If the array has no times, one is missing, or a tick overflows.
 pub fn ticks(name: &str, array: &dyn Array, decimals: u8) -> Result<Vec<i64>, Error> {
     let refuse = |given: String, expected: &str| -> Error { ArgumentError::new("time", given, expected).into() };
-    if array.null_count() > 0 {
-        return Err(refuse(format!("`{name}` with gaps"), "a time in every row"));
-    }
+    ensure!(array.null_count() == 0, refuse(format!("`{name}` with gaps"), "a time in every row"));
     let refused = || refuse(format!("`{name}`"), &format!("times that are ticks of {decimals} decimals of a second"));
     let unit = match array.data_type() {
         DataType::Date32 => {
@@ -270,12 +268,6 @@ impl<W: Write> Recorder<W> {
                 (None, array) => cells(column.name(), array),
             });
         let columns: Vec<Cells> = columns.collect::<Result<_, _>>()?;
-        let mut row = Vec::with_capacity(columns.len());
-        for (i, tick) in ticks.into_iter().enumerate() {
-            row.clear();
-            row.extend(columns.iter().map(|cells| cells[i]));
-            self.push(tick, &row)?;
-        }
-        Ok(())
+        self.push_all(&ticks, &columns)
     }
 }

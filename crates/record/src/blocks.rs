@@ -1,8 +1,8 @@
 //! The blocks and rows of a recording one after the other, by its index or by a scan.
 
 use crate::block::{self, Block};
-use crate::error::{Damage, Error};
-use crate::index::{self, BlockInfo, Segment};
+use crate::error::{Damage, Error, ensure};
+use crate::index::{BlockInfo, Segment};
 use crate::playback::{Index, Playback, Row, entries, read_at};
 use crate::scan::{Order, Scanner};
 use std::io::{Read, Seek, SeekFrom};
@@ -95,25 +95,14 @@ impl<R: Read + Seek> Blocks<'_, R> {
         let header = &self.playback.header;
         // The length before a block and the checksum after it take at most 14 bytes. Nothing longer is read, whatever the index says.
         let limit = block::max_bytes(header) as u64 + 16;
-        if entry.bytes > limit || entry.rows == 0 {
-            return Err(damaged(Damage::NoBlock));
-        }
+        ensure!(entry.bytes <= limit && entry.rows > 0, damaged(Damage::NoBlock));
         let bytes = read_at(&mut self.playback.reader, entry.offset, entry.bytes)?.ok_or(damaged(Damage::CutOff))?;
-        if block::length(header, &bytes).map_err(damaged)? as u64 != entry.bytes {
-            return Err(damaged(Damage::NoBlock));
-        }
+        ensure!(block::length(header, &bytes).map_err(damaged)? as u64 == entry.bytes, damaged(Damage::NoBlock));
         let chosen = &self.playback.chosen;
         let block = block::decode(header, &bytes, |column| chosen.contains(&column)).map_err(damaged)?;
         // Another block of the recording that was put here is not what the index describes, or has been read before.
-        let tolerance = header.schema.time.tolerance();
-        let is_near = |(first, last): (i64, i64)| {
-            first.abs_diff(entry.ticks.0) <= tolerance && last.abs_diff(entry.ticks.1) <= tolerance
-        };
-        let ends = index::ends_of(&block.ticks);
-        let is_described = block.rows() as u64 == entry.rows && ends.is_some_and(is_near);
-        if !is_described || (block.number.is_some() && block.number <= self.last_number) {
-            return Err(damaged(Damage::Misplaced));
-        }
+        let is_next = block.number.is_none() || block.number > self.last_number;
+        ensure!(entry.describes(&block.ticks, header) && is_next, damaged(Damage::Misplaced));
         self.last_number = block.number;
         Ok(block)
     }

@@ -3,7 +3,7 @@
 //! The test is exact. In rounded arithmetic `|a - b| <= delta` accepts differences that exceed `delta` by half a unit in the last place.
 //! Here the rounding error of the difference decides if the rounded difference equals `delta`.
 
-use fewbits_block_codec::ArgumentError;
+use fewbits_block_codec::{ArgumentError, ensure};
 
 /// The error bound of a column, for every finite sample. Gaps, NaN and infinities are always restored exactly.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,27 +38,20 @@ impl Bound {
         match self {
             Self::Absolute(delta) => {
                 ArgumentError::positive("bound", delta)?;
-                if !(2.0 * delta).is_finite() {
-                    return Err(ArgumentError::new("bound", delta, "a number whose double is finite"));
-                }
+                ensure!((2.0 * delta).is_finite(), "bound", delta, "a number whose double is finite");
             }
             Self::ShareOfRange(share) => {
                 ArgumentError::positive("bound", share)?;
-                if share > 1.0 {
-                    return Err(ArgumentError::new("bound", share, "a share of the range, at most 1"));
-                }
+                ensure!(share <= 1.0, "bound", share, "a share of the range, at most 1");
             }
             Self::Decimals(places) if places > MAX_DECIMALS => {
                 return Err(ArgumentError::new("bound", places, "at most 15 decimals"));
             }
             Self::Relative { share, floor } => {
-                if !(MIN_SHARE..=0.5).contains(&share) {
-                    return Err(ArgumentError::new("bound", share, "a share of each value, from 1e-6 to 0.5"));
-                }
+                ensure!((MIN_SHARE..=0.5).contains(&share), "bound", share, "a share of each value, from 1e-6 to 0.5");
                 ArgumentError::positive("floor", floor)?;
-                if !(4.0 * floor / share).is_finite() {
-                    return Err(ArgumentError::new("floor", floor, "a number whose quotient by the share is finite"));
-                }
+                let expected = "a number whose quotient by the share is finite";
+                ensure!((4.0 * floor / share).is_finite(), "floor", floor, expected);
             }
             Self::Lossless | Self::Decimals(_) => {}
         }

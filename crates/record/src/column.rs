@@ -3,7 +3,7 @@
 use crate::bound::Bound;
 use crate::error::Error;
 use crate::integers::Integers;
-use fewbits_block_codec::ArgumentError;
+use fewbits_block_codec::{ArgumentError, ensure};
 
 /// Largest length of a name or a unit in bytes.
 const MAX_NAME: usize = 1 << 10;
@@ -67,19 +67,17 @@ impl Column {
     /// If it is negative or not finite, or is above 0 while the bound is [`Bound::Decimals`] or [`Bound::Relative`], to which none can be
     /// added.
     pub fn with_earlier_bound(self, earlier: f64) -> Result<Self, Error> {
-        if !(earlier >= 0.0 && (2.0 * earlier).is_finite()) {
-            return Err(
-                ArgumentError::new("earlier", earlier, "zero or a positive number whose double is finite").into()
-            );
-        }
-        if earlier > 0.0 && self.integers.is_some() {
-            return Err(ArgumentError::new("earlier", earlier, "zero for a column of whole numbers").into());
-        }
-        if earlier > 0.0 && matches!(self.bound, Bound::Decimals(_) | Bound::Relative { .. }) {
-            let expected = "an absolute bound, a share of the range or lossless for a column with an earlier bound";
-            return Err(ArgumentError::new("bound", format!("{:?}", self.bound), expected).into());
-        }
+        let expected = "zero or a positive number whose double is finite";
+        ensure!(earlier >= 0.0 && (2.0 * earlier).is_finite(), "earlier", earlier, expected);
+        ensure!(earlier == 0.0 || self.integers.is_none(), "earlier", earlier, "zero for a column of whole numbers");
+        let expected = "an absolute bound, a share of the range or lossless for a column with an earlier bound";
+        ensure!(earlier == 0.0 || self.is_summed(), "bound", format!("{:?}", self.bound), expected);
         Ok(Self { earlier, ..self })
+    }
+
+    /// Whether the bound is a distance, of which others can be added and which can be kept around a circle.
+    fn is_summed(&self) -> bool {
+        !matches!(self.bound, Bound::Decimals(_) | Bound::Relative { .. })
     }
 
     /// Sets the unit of the samples, which is only shown to users.
@@ -101,10 +99,8 @@ impl Column {
     /// [`Bound::Relative`].
     pub fn with_period(self, period: f64) -> Result<Self, Error> {
         ArgumentError::positive("period", period)?;
-        if let Bound::Decimals(_) | Bound::Relative { .. } = self.bound {
-            let expected = "an absolute bound, a share of the range or lossless for a column on a circle";
-            return Err(ArgumentError::new("bound", format!("{:?}", self.bound), expected).into());
-        }
+        let expected = "an absolute bound, a share of the range or lossless for a column on a circle";
+        ensure!(self.is_summed(), "bound", format!("{:?}", self.bound), expected);
         check_circle(self.bound, period)?;
         Ok(Self {
             period: Some(period),
@@ -121,14 +117,8 @@ impl Column {
         ArgumentError::finite("from", from)?;
         ArgumentError::finite("to", to)?;
         let range = to - from;
-        if range.is_nan() || range < 0.0 || range == f64::INFINITY {
-            return Err(ArgumentError::new(
-                "range",
-                format!("{from:?} to {to:?}"),
-                "a range of finite width, `from` below `to`",
-            )
-            .into());
-        }
+        let expected = "a range of finite width, `from` below `to`";
+        ensure!((0.0..f64::INFINITY).contains(&range), "range", format!("{from:?} to {to:?}"), expected);
         Ok(Self {
             range: Some(range),
             ..self
@@ -205,16 +195,12 @@ pub(crate) fn check_circle(bound: Bound, period: f64) -> Result<(), ArgumentErro
         Bound::ShareOfRange(share) => share * period,
         Bound::Lossless | Bound::Decimals(_) | Bound::Relative { .. } => period,
     };
-    if smallest.is_nan() || period / smallest > MAX_CIRCLE_CELLS {
-        return Err(ArgumentError::new("period", period, "at most 2^40 times the bound"));
-    }
+    ensure!(period / smallest <= MAX_CIRCLE_CELLS, "period", period, "at most 2^40 times the bound");
     Ok(())
 }
 
 /// A text of at most 1024 bytes.
 pub(crate) fn text(name: &'static str, text: String) -> Result<String, ArgumentError> {
-    if text.len() > MAX_NAME {
-        return Err(ArgumentError::new(name, format!("{} bytes long", text.len()), "at most 1024 bytes"));
-    }
+    ensure!(text.len() <= MAX_NAME, name, format!("{} bytes long", text.len()), "at most 1024 bytes");
     Ok(text)
 }

@@ -2,6 +2,7 @@
 
 use fewbits_block_codec::ArgumentError;
 use fewbits_block_codec::bytes::Unread;
+pub(crate) use fewbits_block_codec::ensure;
 use std::io;
 
 /// Errors of this crate. After a refused row the recorder is unchanged.

@@ -2,7 +2,7 @@
 
 use crate::bound::Bound;
 use crate::column::Column;
-use crate::error::{Damage, Error};
+use crate::error::{Damage, Error, ensure};
 use crate::header::{BLANK, Form, Header, IDENTITY_BYTES, MAGIC, MAGIC_5, MAX_HEADER, VERSION, VERSION_5};
 use crate::header_column::{column, refused};
 use crate::schema::{MAX_COLUMNS, Schema, TIME_NAME, TimeBase, TimeFormat, default_rows};
@@ -17,9 +17,7 @@ impl Header {
     /// If the bytes are no header.
     pub(crate) fn read(bytes: &[u8]) -> Result<Known, Error> {
         let known = bytes.len().min(MAGIC.len());
-        if bytes[..known] != MAGIC[..known] {
-            return Err(Error::NotARecording);
-        }
+        ensure!(bytes[..known] == MAGIC[..known], Error::NotARecording);
         let mut reader = Bytes(&bytes[known..]);
         let Ok(version) = reader.byte() else {
             return Ok(Known::More);
@@ -58,9 +56,7 @@ impl Header {
         let Ok(check) = reader.array::<CHECK_BYTES>().map(u32::from_le_bytes) else {
             return Ok(Known::More);
         };
-        if check != checksum(&[&bytes[..end]]) {
-            return Err(Error::Header(Damage::Checksum));
-        }
+        ensure!(check == checksum(&[&bytes[..end]]), Error::Header(Damage::Checksum));
         let mut body = Bytes(body);
         let (layout, identity) = match version {
             VERSION_5 => (Layout::Version5, 0),
@@ -85,9 +81,7 @@ impl Header {
         let (content, check) = bytes
             .split_last_chunk::<CHECK_BYTES>()
             .ok_or(Error::Header(Damage::CutOff))?;
-        if u32::from_le_bytes(*check) != checksum(&[content]) {
-            return Err(Error::Header(Damage::Checksum));
-        }
+        ensure!(u32::from_le_bytes(*check) == checksum(&[content]), Error::Header(Damage::Checksum));
         // Magic bytes and version.
         let mut body = Bytes(content.get(MAGIC.len() + 1..).ok_or(Error::Header(Damage::CutOff))?);
         let header = BLANK.body(&mut body, Layout::Single).map_err(Error::Header)?;
@@ -169,9 +163,7 @@ impl Header {
                 time_name = fields.text(&own.time_name)?;
             }
             // What a writer leaves out.
-            if time_name.is_empty() || time_name == TIME_NAME {
-                return Err(Damage::Content("name of the times"));
-            }
+            ensure!(!time_name.is_empty() && time_name != TIME_NAME, Damage::Content("name of the times"));
         }
         let (mut origin, mut step, mut count) = (0, 1, 1);
         if kind & ORIGIN != 0 {

@@ -6,7 +6,7 @@
 
 use crate::aggregate::{self, Aggregate};
 use crate::block::Cells;
-use crate::error::Damage;
+use crate::error::{Damage, ensure};
 use crate::header::{Header, VERSION_5};
 use crate::wire::{Bytes, Fields, checked, read_checked, unzigzag, zigzag};
 
@@ -76,6 +76,17 @@ impl BlockInfo {
     }
 }
 
+impl BlockInfo {
+    /// Whether these may be the ticks of the block that this entry describes.
+    pub(crate) fn describes(&self, ticks: &[i64], header: &Header) -> bool {
+        let tolerance = header.schema.time.tolerance();
+        let is_near = |(first, last): (i64, i64)| {
+            first.abs_diff(self.ticks.0) <= tolerance && last.abs_diff(self.ticks.1) <= tolerance
+        };
+        ticks.len() as u64 == self.rows && ends_of(ticks).is_some_and(is_near)
+    }
+}
+
 /// The smallest and the largest of pairs of these.
 pub(crate) fn ends(pairs: impl Iterator<Item = (i64, i64)>) -> Option<(i64, i64)> {
     pairs.reduce(|(low, high), (first, last)| (low.min(first), high.max(last)))
@@ -142,9 +153,7 @@ pub(crate) fn max_content(kind: u8, header: &Header) -> usize {
 /// Kind, content and whole length of the special record at the front, which begins with 0.
 pub(crate) fn read_special<'a>(header: &Header, bytes: &'a [u8]) -> Result<(u8, &'a [u8], usize), Damage> {
     let [mark, kind] = Bytes(bytes).array()?;
-    if mark != 0 {
-        return Err(Damage::NoBlock);
-    }
+    ensure!(mark == 0, Damage::NoBlock);
     let limit = max_content(kind, header);
     let (content, whole) = read_checked(header.check, bytes, 2, 0..=limit)?;
     Ok((kind, content, whole))

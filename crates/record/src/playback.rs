@@ -191,28 +191,27 @@ pub(crate) fn read_at(reader: &mut (impl Read + Seek), offset: u64, length: u64)
 
 /// The index of a recording of several blocks.
 pub(crate) fn index_of(reader: &mut (impl Read + Seek), header: &Header) -> Result<Index, Error> {
-    let without = if header.has_end() {
+    Ok(found(reader, header)?.unwrap_or(if header.has_end() {
         Index::Missing
     } else {
         Index::NotNeeded
-    };
+    }))
+}
+
+/// The index in front of the last bytes; `None` if there is none.
+fn found(reader: &mut (impl Read + Seek), header: &Header) -> Result<Option<Index>, Error> {
     let end = reader.seek(SeekFrom::End(0)).map_err(Error::io("read"))?;
     let Some(trailer) = end.checked_sub(TRAILER_BYTES as u64) else {
-        return Ok(without);
+        return Ok(None);
     };
-    let Some(bytes) = read_at(reader, trailer, TRAILER_BYTES as u64)? else {
-        return Ok(without);
+    let bytes = read_at(reader, trailer, TRAILER_BYTES as u64)?.unwrap_or_default();
+    let length = bytes
+        .first_chunk()
+        .map_or(0, |length| u64::from(u32::from_le_bytes(*length)));
+    let Some(start) = trailer.checked_sub(length).filter(|_| bytes.ends_with(&END)) else {
+        return Ok(None);
     };
-    let Some((length, mark)) = bytes.split_first_chunk::<4>() else {
-        return Ok(without);
-    };
-    let length = u64::from(u32::from_le_bytes(*length));
-    let Some(start) = trailer.checked_sub(length).filter(|_| mark == END) else {
-        return Ok(without);
-    };
-    let Some(bytes) = read_at(reader, start, length)? else {
-        return Ok(without);
-    };
+    let bytes = read_at(reader, start, length)?.unwrap_or_default();
     let first = header.length as u64;
     let (found, expected) = match index::read_special(header, &bytes) {
         Ok((index::FOOTER, content, whole)) if whole as u64 == length => {
@@ -222,11 +221,11 @@ pub(crate) fn index_of(reader: &mut (impl Read + Seek), header: &Header) -> Resu
             let entries = read(content, |fields| index::segment(fields, header, first, &[]));
             (entries.map(|entries| vec![Segment::new(length, &entries)]), trailer)
         }
-        _ => return Ok(without),
+        _ => return Ok(None),
     };
     // The segments must fill the file up to the footer: offsets of blocks are sums of lengths.
     let ends = |segments: &Vec<Segment>| segments.last().map_or(first, Segment::end) == expected;
-    Ok(found.ok().filter(ends).map_or(Index::Other, Index::Whole))
+    Ok(Some(found.ok().filter(ends).map_or(Index::Other, Index::Whole)))
 }
 
 /// The entries of a segment; `None` if it is damaged.

@@ -1,8 +1,8 @@
 //! Writing of recordings.
 
 use crate::append::{self, Append};
-use crate::block::{self, Block};
-use crate::error::Error;
+use crate::block::{self, Block, Cells};
+use crate::error::{Error, ensure};
 use crate::header::{Form, Header};
 use crate::index::{self, BLOCKS_PER_SEGMENT, BlockInfo, Segment};
 use crate::resume::{self, Opened};
@@ -185,9 +185,7 @@ impl<W: Write> Recorder<W> {
     /// # Errors
     /// If the number of cells is not that of the columns, or a full block cannot be written.
     pub fn push(&mut self, tick: i64, row: &[Option<f64>]) -> Result<(), Error> {
-        if self.broken {
-            return Err(Error::Broken);
-        }
+        ensure!(!self.broken, Error::Broken);
         let rows_per_block = self.schema.rows_per_block;
         // The first block waits for one row more: if none follows, the recording is a single block, which takes fewer bytes.
         if self.rows.ticks.len() == rows_per_block && row.len() == self.rows.columns.len() {
@@ -209,14 +207,23 @@ impl<W: Write> Recorder<W> {
         self.push(self.next_tick, row)
     }
 
+    /// Adds rows column by column.
+    pub(crate) fn push_all(&mut self, ticks: &[i64], columns: &[Cells]) -> Result<(), Error> {
+        let mut row = Vec::with_capacity(columns.len());
+        for (i, tick) in ticks.iter().enumerate() {
+            row.clear();
+            row.extend(columns.iter().map(|cells| cells[i]));
+            self.push(*tick, &row)?;
+        }
+        Ok(())
+    }
+
     /// Writes the rows so far as a block, even if it is not full, so that a reader can read them.
     ///
     /// # Errors
     /// If writing fails.
     pub fn flush(&mut self) -> Result<(), Error> {
-        if self.broken {
-            return Err(Error::Broken);
-        }
+        ensure!(!self.broken, Error::Broken);
         if !self.rows.ticks.is_empty() {
             self.write_block()?;
         }
@@ -229,9 +236,7 @@ impl<W: Write> Recorder<W> {
     /// # Errors
     /// If writing fails.
     pub fn finish(mut self) -> Result<W, Error> {
-        if self.broken {
-            return Err(Error::Broken);
-        }
+        ensure!(!self.broken, Error::Broken);
         if self.header.is_none() && !self.rows.ticks.is_empty() {
             let bytes = self.single();
             self.write(&bytes)?;
@@ -243,7 +248,7 @@ impl<W: Write> Recorder<W> {
         }
         self.write_header()?;
         // A single segment is also the footer.
-        let is_only = self.segments.is_empty() && !self.entries.is_empty();
+        let is_only = self.segments.is_empty() && (1..=BLOCKS_PER_SEGMENT).contains(&self.entries.len());
         self.write_segment(if is_only { index::ONLY } else { index::SEGMENT })?;
         let footer = match &self.header {
             Some(header) if !is_only => {
@@ -319,7 +324,7 @@ impl<W: Write> Recorder<W> {
         self.write(bytes)?;
         self.entries.push(entry);
         self.next_number += 1;
-        if self.entries.len() == BLOCKS_PER_SEGMENT {
+        if self.entries.len() >= BLOCKS_PER_SEGMENT {
             self.write_segment(index::SEGMENT)?;
         }
         Ok(())
@@ -327,9 +332,7 @@ impl<W: Write> Recorder<W> {
 
     fn write_block(&mut self) -> Result<(), Error> {
         self.write_header()?;
-        let Some(header) = &self.header else {
-            return Err(Error::Broken);
-        };
+        let header = self.header.as_ref().ok_or(Error::Broken)?;
         let rows = self.rows.ticks.len();
         let (bytes, restored) = self.rows.first(rows, header, self.next_number, self.effort).block();
         // The index has the ends of what a reader gets, which may lie outside those of the samples.
@@ -343,10 +346,14 @@ impl<W: Write> Recorder<W> {
         if self.entries.is_empty() {
             return Ok(());
         }
-        let Some(header) = &self.header else {
-            return Err(Error::Broken);
+        let header = self.header.as_ref().ok_or(Error::Broken)?;
+        // Damage of which a resumed recording keeps the bytes may put more blocks between segments: a segment that lists none has them searched.
+        let listed = if self.entries.len() > BLOCKS_PER_SEGMENT {
+            &[]
+        } else {
+            self.entries.as_slice()
         };
-        let content = written(|fields| index::segment(fields, header, 0, &self.entries));
+        let content = written(|fields| index::segment(fields, header, 0, listed));
         let bytes = index::special(header.check, kind, &content);
         self.write(&bytes)?;
         self.segments.push(Segment::new(bytes.len() as u64, &self.entries));

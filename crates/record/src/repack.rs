@@ -10,7 +10,7 @@ use crate::playback::Playback;
 use crate::ranges::{self, Ends};
 use crate::recorder::Recorder;
 use crate::schema::Schema;
-use fewbits_block_codec::{ArgumentError, Effort};
+use fewbits_block_codec::{ArgumentError, Effort, ensure};
 use std::io::{Read, Seek, Write};
 
 /// What a pass over a recording finds for a column.
@@ -116,9 +116,7 @@ impl<R: Read + Seek> Playback<R> {
     pub fn widened(&mut self, bounds: &[Option<Bound>]) -> Result<Option<Schema>, Error> {
         let schema = self.header.schema.clone();
         let columns = schema.columns.len();
-        if bounds.len() != columns {
-            return Err(ArgumentError::new("bounds", bounds.len(), format!("{columns} bounds, one per column")).into());
-        }
+        ensure!(bounds.len() == columns, "bounds", bounds.len(), format!("{columns} bounds, one per column"));
         let mut found = vec![Found::default(); columns];
         if bounds.iter().flatten().any(|bound| is_share(*bound))
             || schema.columns.iter().any(|column| is_share(column.bound))
@@ -157,14 +155,9 @@ impl<R: Read + Seek> Playback<R> {
         let columns = self.header.schema.columns.len();
         self.chosen = (0..columns).collect();
         let mut recorder = Recorder::new(writer, schema).with_effort(effort);
-        let mut row = Vec::with_capacity(columns);
         for block in self.blocks() {
             let block = block?;
-            for (i, tick) in block.ticks.iter().enumerate() {
-                row.clear();
-                row.extend(block.columns.iter().map(|cells| cells[i]));
-                recorder.push(*tick, &row)?;
-            }
+            recorder.push_all(&block.ticks, &block.columns)?;
         }
         recorder.finish()
     }

@@ -2,7 +2,7 @@
 
 use crate::append::{self, Append};
 use crate::block;
-use crate::error::Error;
+use crate::error::{Damage, Error, ensure};
 use crate::header::{Header, VERSION_5};
 use crate::index::{self, BLOCKS_PER_SEGMENT, BlockInfo, Segment};
 use crate::playback::{self, Index};
@@ -37,9 +37,7 @@ pub(crate) fn open(path: &Path) -> Result<Opened, Error> {
         .open(path)
         .map_err(Error::io("open"))?;
     append::lock(&file)?;
-    if !is_still_there(&file, path) {
-        return Err(Error::Locked);
-    }
+    ensure!(is_still_there(&file, path), Error::Locked);
     let mut scanner = Scanner::default();
     let (header, single) = scanner.header(&mut file)?;
     if single.is_some() || header.version == VERSION_5 {
@@ -61,6 +59,8 @@ pub(crate) fn open(path: &Path) -> Result<Opened, Error> {
         Some(resumed) => resumed,
         None => from_blocks(&mut file, header)?,
     };
+    let are_numbers_left = resumed.next_number < block::NUMBERS;
+    ensure!(are_numbers_left, Error::Header(Damage::Content("number of a block")));
     file.seek(SeekFrom::Start(resumed.offset)).map_err(Error::io("read"))?;
     let handle = file.try_clone().map_err(Error::io("open"))?;
     let append = Append::planned(handle, path, resumed.offset);
@@ -140,7 +140,9 @@ fn last_number(file: &mut File, header: &Header, entries: &[BlockInfo]) -> Resul
         return Ok(None);
     };
     let block = block::length(header, &bytes).and_then(|_| block::decode(header, &bytes, |_| false));
-    Ok(block.ok().map(|block| block.number.unwrap_or(0)))
+    // If another block was put there, the last number is not known.
+    let block = block.ok().filter(|block| last.describes(&block.ticks, header));
+    Ok(block.map(|block| block.number.unwrap_or(0)))
 }
 
 /// The state from the blocks themselves, which are decoded once for their ranges.
@@ -174,12 +176,14 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
                 }
                 _ => damaged(),
             }),
-            Kind::Segment if index_agrees(&header, scanner.bytes(&found), &entries) => {
-                segments.push(Segment::new(found.length as u64, &entries));
-                entries.clear();
-            }
-            // A footer, or a segment some of whose blocks were damaged later: its bytes stay and are skipped.
-            Kind::Segment | Kind::Footer => entries.push(damaged()),
+            // A footer, or a segment of other bytes: it stays and is skipped.
+            kind => match listed(&header, scanner.bytes(&found), &entries).filter(|_| kind == Kind::Segment) {
+                Some(segment) => {
+                    segments.push(segment);
+                    entries.clear();
+                }
+                None => entries.push(damaged()),
+            },
         }
     }
     Ok(Resumed {
@@ -191,9 +195,11 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
     })
 }
 
-fn index_agrees(header: &Header, bytes: &[u8], entries: &[BlockInfo]) -> bool {
-    let content = index::read_special(header, bytes);
-    let read = content.and_then(|(_, content, _)| read(content, |fields| index::segment(fields, header, 0, &[])));
-    let sizes = |entries: &[BlockInfo]| -> Vec<_> { entries.iter().map(|entry| (entry.bytes, entry.rows)).collect() };
-    !entries.is_empty() && read.is_ok_and(|read| sizes(&read) == sizes(entries))
+/// The segment of these bytes, if it describes as many bytes as these entries. Blocks that were damaged later are refused when they are read.
+fn listed(header: &Header, bytes: &[u8], entries: &[BlockInfo]) -> Option<Segment> {
+    let (_, content, whole) = index::read_special(header, bytes).ok()?;
+    let start = entries.first()?.offset;
+    let own = read(content, |fields| index::segment(fields, header, start, &[])).ok()?;
+    let segment = Segment::new(whole as u64, &own);
+    (segment.blocks == Segment::new(0, entries).blocks).then_some(segment)
 }

@@ -1,7 +1,7 @@
 //! The schema of a recording: its columns, time, size of blocks.
 
 use crate::column::{Column, text};
-use crate::error::{Error, listed};
+use crate::error::{Error, ensure, listed};
 use fewbits_block_codec::ArgumentError;
 
 /// Largest number of cells (rows times columns, time included) of one block, which a reader must hold in memory.
@@ -85,9 +85,7 @@ impl Schema {
     /// If there is no column, there are more than 4096, two have the same name, a clock has more than 18 decimals or its tolerance exceeds
     /// `2^52`.
     pub fn new(columns: Vec<Column>, time: TimeBase) -> Result<Self, Error> {
-        if columns.is_empty() || columns.len() > MAX_COLUMNS {
-            return Err(ArgumentError::new("columns", columns.len(), "1 to 4096 columns").into());
-        }
+        ensure!((1..=MAX_COLUMNS).contains(&columns.len()), "columns", columns.len(), "1 to 4096 columns");
         let mut names: Vec<&str> = columns.iter().map(Column::name).collect();
         names.sort_unstable();
         if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
@@ -99,12 +97,8 @@ impl Schema {
             decimals, tolerance, ..
         } = time
         {
-            if decimals > 18 {
-                return Err(ArgumentError::new("decimals", decimals, "at most 18 decimals of a second").into());
-            }
-            if tolerance > MAX_TOLERANCE {
-                return Err(ArgumentError::new("tolerance", tolerance, "at most 2^52 ticks").into());
-            }
+            ensure!(decimals <= 18, "decimals", decimals, "at most 18 decimals of a second");
+            ensure!(tolerance <= MAX_TOLERANCE, "tolerance", tolerance, "at most 2^52 ticks");
         }
         let rows_per_block = default_rows(columns.len());
         Ok(Self {
@@ -166,9 +160,7 @@ impl Schema {
     /// As [`with_rows_per_block`](Self::with_rows_per_block), for what a header states.
     pub(crate) fn with_exact_rows(self, rows: usize) -> Result<Self, Error> {
         let limit = MAX_CELLS / (self.columns.len() + 1);
-        if rows == 0 || rows > limit {
-            return Err(ArgumentError::new("rows_per_block", rows, format!("1 to {limit} rows")).into());
-        }
+        ensure!((1..=limit).contains(&rows), "rows_per_block", rows, format!("1 to {limit} rows"));
         Ok(Self {
             rows_per_block: rows,
             ..self

@@ -5,7 +5,7 @@
 //! which special cell it is, unless it equals the one above: the same as the last one of the block, or three bits and for some kinds 64
 //! more.
 
-use crate::error::Damage;
+use crate::error::{Damage, ensure};
 use fewbits_block_codec::arithmetic::{Coder, Reader, Writer};
 
 /// Kind of a special cell.
@@ -159,9 +159,7 @@ pub(crate) fn code<C: Coder>(
             last = special;
             all[*column].push(Some(special));
             // Damaged bytes may be too few: stop here instead of inventing the remaining rows.
-            if coder.overran() {
-                return Err(Damage::Content("special cells"));
-            }
+            ensure!(!coder.overran(), Damage::Content("special cells"));
         }
         // A row in which all of several columns are special is probably part of an outage, which goes on in the next row.
         all_above = found > 1 && found == present.len();

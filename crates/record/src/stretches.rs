@@ -31,29 +31,22 @@ pub struct Stretch {
 struct Stretches {
     every: i64,
     ticks: (i64, i64),
-    chosen: Vec<usize>,
-    /// How chosen columns code whole numbers.
-    integers: Vec<Option<Integers>>,
+    /// The requested columns, and how they code whole numbers.
+    chosen: Vec<(usize, Option<Integers>)>,
     found: BTreeMap<i64, Stretch>,
 }
 
 impl Stretches {
     fn at(&mut self, number: i64) -> &mut Stretch {
-        let Self {
-            every,
-            chosen,
-            integers,
-            found,
-            ..
-        } = self;
-        found.entry(number).or_insert_with(|| Stretch {
+        self.found.entry(number).or_insert_with(|| Stretch {
             // The first stretch may begin before the smallest tick.
-            tick: number.saturating_mul(*every),
+            tick: number.saturating_mul(self.every),
             rows: 0,
-            columns: vec![Aggregate::default(); chosen.len()],
-            wholes: integers
+            columns: vec![Aggregate::default(); self.chosen.len()],
+            wholes: self
+                .chosen
                 .iter()
-                .map(|integers| integers.map(|_| WholeAggregate::default()))
+                .map(|(_, integers)| integers.map(|_| WholeAggregate::default()))
                 .collect(),
         })
     }
@@ -69,7 +62,7 @@ impl Stretches {
     fn merge(&mut self, entry: &BlockInfo, tolerance: i64) -> bool {
         // The ticks of a reader may differ from those of the index by the tolerance.
         let (first, last) = (entry.ticks.0.saturating_sub(tolerance), entry.ticks.1.saturating_add(tolerance));
-        let is_indexed = self.integers.iter().all(Option::is_none);
+        let is_indexed = self.chosen.iter().all(|(_, integers)| integers.is_none());
         let number = self.of_all((first, last)).filter(|_| is_indexed);
         let (Some(aggregates), Some(number)) = (&entry.aggregates, number) else {
             return false;
@@ -77,25 +70,25 @@ impl Stretches {
         let chosen = self.chosen.clone();
         let stretch = self.at(number);
         stretch.rows += entry.rows;
-        for (sum, column) in stretch.columns.iter_mut().zip(chosen) {
+        for (sum, (column, _)) in stretch.columns.iter_mut().zip(chosen) {
             sum.merge(&aggregates[column]);
         }
         true
     }
 
     fn add(&mut self, block: &Block) {
-        let (chosen, integers) = (self.chosen.clone(), self.integers.clone());
+        let chosen = self.chosen.clone();
         for (row, tick) in block.ticks.iter().enumerate() {
             if *tick < self.ticks.0 || *tick > self.ticks.1 {
                 continue;
             }
             let stretch = self.at(tick.div_euclid(self.every));
             stretch.rows += 1;
-            for (i, column) in chosen.iter().enumerate() {
+            for (i, (column, integers)) in chosen.iter().enumerate() {
                 let Some(value) = block.columns[*column][row] else {
                     continue;
                 };
-                match (&mut stretch.wholes[i], integers[i]) {
+                match (&mut stretch.wholes[i], integers) {
                     (Some(whole), Some(integers)) => whole.add(integers.number(value)),
                     _ => stretch.columns[i].add(value),
                 }
@@ -122,12 +115,11 @@ impl<R: Read + Seek> Playback<R> {
         let length = i64::try_from(every).ok().filter(|every| *every > 0);
         let length = length.ok_or_else(|| ArgumentError::new("every", every, "1 to 2^63 - 1 ticks"))?;
         let columns = self.header.schema.columns();
-        let integers: Vec<_> = self.chosen.iter().map(|column| columns[*column].integers()).collect();
+        let chosen = self.chosen.iter().map(|column| (*column, columns[*column].integers()));
         let mut stretches = Stretches {
             every: length,
             ticks: (from, to),
-            chosen: self.chosen.clone(),
-            integers,
+            chosen: chosen.collect(),
             found: BTreeMap::new(),
         };
         let tolerance = i64::try_from(self.header.schema.time.tolerance()).unwrap_or(i64::MAX);

@@ -26,12 +26,7 @@ pub(crate) enum TimeKind {
 
 impl TimeKind {
     pub(crate) fn from_bits(bits: u64) -> Self {
-        match bits & 3 {
-            0 => Self::Grid,
-            1 => Self::Even,
-            2 => Self::Coded,
-            _ => Self::Raw,
-        }
+        [Self::Grid, Self::Even, Self::Coded, Self::Raw][(bits & 3) as usize]
     }
 }
 

@@ -1,6 +1,6 @@
 //! Records with a length and a checksum. Integers, fields and the byte reader are those of the block codec.
 
-use crate::error::Damage;
+use crate::error::{Damage, ensure};
 use fewbits_block_codec::bytes::Unread;
 pub(crate) use fewbits_block_codec::bytes::{Bytes, Fields, push_varint, unzigzag, zigzag};
 use std::ops::RangeInclusive;
@@ -54,15 +54,11 @@ pub(crate) fn read_checked(
         Unread::CutOff => Damage::CutOff,
         _ => Damage::NoBlock,
     })?;
-    if !lengths.contains(&length) {
-        return Err(Damage::NoBlock);
-    }
+    ensure!(lengths.contains(&length), Damage::NoBlock);
     let content = reader.take(length)?;
     let end = bytes.len() - reader.0.len();
     let sum = u32::from_le_bytes(reader.array::<CHECK_BYTES>()?);
-    if sum != checksum(&[&check.to_le_bytes(), &bytes[..end]]) {
-        return Err(Damage::Checksum);
-    }
+    ensure!(sum == checksum(&[&check.to_le_bytes(), &bytes[..end]]), Damage::Checksum);
     Ok((content, end + CHECK_BYTES))
 }
 

@@ -3,7 +3,7 @@
 use super::alphabet::{CODES, CONTEXTS, ESCAPE, SIZE_FIELD, SMALLEST, SYMBOLS, first_context, next_context, symbol};
 use super::weights::{Counts, SLOT_BITS, SLOTS, Tables};
 use super::words::{LANES, LOW, WORD_BITS, stretches};
-use crate::vectors::vectorised_narrow;
+use crate::vectors::narrow;
 use std::hint::select_unpredictable;
 
 /// Codes of rows (`SYMBOLS context + symbol`) and how often each lane has each.
@@ -103,16 +103,13 @@ impl Symbols {
             .iter()
             .flat_map(|counts| counts.iter().step_by(SYMBOLS))
             .sum::<u32>() as usize;
-        vectorised_narrow(
-            #[inline(always)]
-            || {
-                if low > 0 || escapes > 0 {
-                    self.coded::<true>(&parts, turned, low, escapes)
-                } else {
-                    self.coded::<false>(&parts, turned, low, escapes)
-                }
-            },
-        )
+        narrow!({
+            if low > 0 || escapes > 0 {
+                self.coded::<true>(&parts, turned, low, escapes)
+            } else {
+                self.coded::<false>(&parts, turned, low, escapes)
+            }
+        })
     }
 
     /// `RAW`: whether any row has raw bits.

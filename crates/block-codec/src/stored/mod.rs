@@ -26,19 +26,19 @@
 mod alphabet;
 mod lane;
 mod lanes;
-pub(crate) mod order;
+mod order;
 mod plan;
 #[cfg(test)]
 mod tests;
 mod weights;
-pub(crate) mod words;
+mod words;
 
 use crate::arithmetic::{Coder, Reader, Writer};
 use crate::bytes::{Bytes, push_varint};
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use crate::indices::code_first;
 use crate::rows::{LARGEST, damaged};
-use crate::vectors::vectorised_narrow;
+use crate::vectors::narrow;
 use lane::{FIRST, Lane, SECOND, VALUES};
 use lanes::Symbols;
 use order::Order;
@@ -134,22 +134,16 @@ pub(crate) fn write(indices: &[i64], plan: &Plan, mut bytes: Vec<u8>) -> Result<
         tail,
     };
     let stretched = start.stretched(rows);
-    let symbols = vectorised_narrow(
-        #[inline(always)]
-        || match order {
-            Order::Values { .. } => Symbols::new::<true>(&mut differences, stretched, low),
-            _ => Symbols::new::<false>(&mut differences, stretched, low),
-        },
-    );
+    let symbols = narrow!(match order {
+        Order::Values { .. } => Symbols::new::<true>(&mut differences, stretched, low),
+        _ => Symbols::new::<false>(&mut differences, stretched, low),
+    });
     let counts = symbols.counts();
-    let tables = vectorised_narrow(
-        #[inline(always)]
-        || Tables::of(&counts),
-    );
-    let mut writer = Writer::default();
-    Start::code(&mut writer, Some(start))?;
-    let tables = Tables::code(&mut writer, Some(tables))?;
-    let stored = writer.finish();
+    let tables = narrow!(Tables::of(&counts));
+    let stored = Writer::all(Vec::new(), |writer| {
+        Start::code(writer, Some(start))?;
+        Tables::code(writer, Some(&tables))
+    })?;
     let coded = symbols.encoded(&tables, &differences, low);
     let head = (coded.words.len() as u64 % 4) << PAD_BITS | coded.pads;
     push_varint(&mut bytes, (stored.len() as u64) << HEAD_BITS | head);
@@ -161,16 +155,12 @@ pub(crate) fn write(indices: &[i64], plan: &Plan, mut bytes: Vec<u8>) -> Result<
 
 /// The indices of a block of [`write`], without its head.
 pub(crate) fn read(bytes: &[u8], rows: usize) -> Result<Vec<i64>, Damaged> {
-    if rows < STORED_ROWS {
-        return Err(Damaged::new("block", format!("tables for {rows} rows"), "1024 rows or more"));
-    }
+    ensure!(rows >= STORED_ROWS, Damaged::new("block", format!("tables for {rows} rows"), "1024 rows or more"));
     let mut bytes = Bytes(bytes);
     let head = bytes.varint()?;
     let stored = bytes.take(usize::try_from(head >> HEAD_BITS).unwrap_or(usize::MAX))?;
-    let mut reader = Reader::new(stored);
-    let start = Start::code(&mut reader, None)?;
-    let tables = Tables::code(&mut reader, None)?;
-    reader.finish()?;
+    let (start, tables) =
+        Reader::all(stored, |reader| Ok::<_, Damaged>((Start::code(reader, None)?, Tables::code(reader, None)?)))?;
     let is_of_values = matches!(start.order, Order::Values { .. });
     let block = Block {
         start,
@@ -203,10 +193,7 @@ impl Block {
         let mut found = [0; LANES * STRETCH];
         for length in stretches(self.start.stretched(rows - 1)) {
             let found = &mut found[..LANES * length];
-            vectorised_narrow(
-                #[inline(always)]
-                || self.stretch::<LOW_BITS, ORDER>(&mut words, &mut states, found),
-            );
+            narrow!(self.stretch::<LOW_BITS, ORDER>(&mut words, &mut states, found));
             words.check(&states)?;
             for found in found.chunks(length) {
                 self.push::<ORDER>(&mut indices, found)?;

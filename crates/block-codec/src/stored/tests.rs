@@ -202,7 +202,7 @@ fn tables_return() {
         }
         let tables = Tables::of(&counts);
         let mut writer = Writer::default();
-        Tables::code(&mut writer, Some(tables.clone())).unwrap();
+        Tables::code(&mut writer, Some(&tables)).unwrap();
         let bytes = writer.finish();
         assert_eq!(Tables::code(&mut Reader::new(&bytes), None).unwrap(), tables);
         for (widths, counts) in tables.widths().zip(&counts) {

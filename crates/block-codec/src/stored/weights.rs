@@ -18,7 +18,8 @@ use super::alphabet::{CONTEXTS, ESCAPE, SYMBOLS, ZERO, next_context};
 use super::words::fill_slots;
 use crate::arithmetic::Coder;
 use crate::counts::Count;
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
+use crate::groups::joined;
 use fewbits_node::elementary::log2;
 
 /// A table has `2^SLOT_BITS` slots.
@@ -96,29 +97,11 @@ impl Tables {
         let lowest = (1..ZERO).find(is_used).unwrap_or(ZERO);
         let highest = (ZERO + 1..SYMBOLS).rev().find(is_used).unwrap_or(ZERO);
         let bits_of_table = BITS_OF_ANY * (highest - lowest) as f32;
-        let mut groups: Vec<Group> = counts
+        let groups = counts
             .iter()
             .map(|counts| Group::new(1, *counts, bits_of_table))
             .collect();
-        let mut joined: Vec<Group> = groups
-            .windows(2)
-            .map(|pair| pair[0].joined(&pair[1], bits_of_table))
-            .collect();
-        loop {
-            let saved = |at: usize| groups[at].bits + groups[at + 1].bits - joined[at].bits;
-            let best = (0..joined.len()).max_by(|a, b| saved(*a).total_cmp(&saved(*b)));
-            let Some(at) = best.filter(|at| saved(*at) >= 0.0) else {
-                break;
-            };
-            groups[at] = joined.remove(at);
-            groups.remove(at + 1);
-            if at > 0 {
-                joined[at - 1] = groups[at - 1].joined(&groups[at], bits_of_table);
-            }
-            if at < joined.len() {
-                joined[at] = groups[at].joined(&groups[at + 1], bits_of_table);
-            }
-        }
+        let groups = joined(groups, |group| group.bits, 0.0, |a, b| a.joined(b, bits_of_table));
         let largest = groups.iter().flat_map(|group| group.counts).max().unwrap_or(0) as f32;
         let share = 1.0 / ROWS_OF_ONE.max(largest / (LARGEST_WEIGHT * LARGEST_WEIGHT) as f32);
         let weight = |count: u32| ((count as f32 * share).sqrt() + 0.5) as u32;
@@ -141,26 +124,22 @@ impl Tables {
     }
 
     /// Codes the tables: `wanted` at the writer, `None` at the reader.
-    pub(super) fn code<C: Coder>(coder: &mut C, wanted: Option<Self>) -> Result<Self, Damaged> {
-        let told = wanted.as_ref().map_or([0; 2], |tables| tables.sizes);
+    pub(super) fn code<C: Coder>(coder: &mut C, wanted: Option<&Self>) -> Result<Self, Damaged> {
+        let told = wanted.map_or([0; 2], |tables| tables.sizes);
         let sizes = told.map(|size| coder.raw(size as u64, SIZES_FIELD) as usize);
         let (mut join, mut table_of) = (Count::NEW, [0; CONTEXTS]);
         for context in 1..CONTEXTS {
-            let own = wanted
-                .as_ref()
-                .is_some_and(|tables| tables.table_of[context] == tables.table_of[context - 1]);
+            let own = wanted.is_some_and(|tables| tables.table_of[context] == tables.table_of[context - 1]);
             let is_joined = join.decide(coder, own);
             table_of[context] = table_of[context - 1] + usize::from(!is_joined);
         }
         let mut weight_coder = WeightCoder::new();
         let mut weights: Vec<[u8; SYMBOLS]> = Vec::with_capacity(CONTEXTS);
         for table in 0..=table_of[CONTEXTS - 1] {
-            let own = wanted.as_ref().map(|tables| &tables.weights[table]);
+            let own = wanted.map(|tables| &tables.weights[table]);
             weights.push(weight_coder.code(coder, own, weights.last(), sizes));
         }
-        if coder.overran() {
-            return Err(Damaged::new("tables", "cut off", "a weight for each symbol"));
-        }
+        ensure!(!coder.overran(), Damaged::new("tables", "cut off", "a weight for each symbol"));
         Ok(Self {
             sizes,
             table_of,

@@ -38,6 +38,9 @@ impl Block {
     }
 }
 
+/// Blocks have smaller numbers.
+pub(crate) const NUMBERS: u64 = 1 << 60;
+
 const ROWS_FOLLOW: u64 = 4;
 const DESCRIPTORS_FOLLOW: u64 = 8;
 const SPECIALS_FOLLOW: u64 = 16;

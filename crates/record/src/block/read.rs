@@ -1,16 +1,16 @@
 //! Decoding of a block.
 
 use super::{
-    APART, BOUND_FOLLOWS, Block, Cells, DESCRIPTOR_BITS, DESCRIPTORS_FOLLOW, OTHERS_FOLLOW, ROWS_FOLLOW,
+    APART, BOUND_FOLLOWS, Block, Cells, DESCRIPTOR_BITS, DESCRIPTORS_FOLLOW, NUMBERS, OTHERS_FOLLOW, ROWS_FOLLOW,
     SPECIALS_FOLLOW, aligned, plain, shared,
 };
 use crate::bound::Bound;
 use crate::codec::{self, CodecId, Context, JOINT_COLUMNS};
-use crate::error::{Damage, Error};
+use crate::error::{Damage, Error, ensure};
 use crate::header::{Header, VERSION_5};
 use crate::specials::{self, Specials};
 use crate::time::{self, TimeKind};
-use crate::wire::{Bytes, push_varint, short_bound};
+use crate::wire::{Bytes, Fields, push_varint, short_bound};
 use fewbits_block_codec::arithmetic::Reader;
 
 /// Decodes one block whose checksum was verified. Columns that are not `wanted` stay empty.
@@ -19,38 +19,37 @@ pub(crate) fn decode(header: &Header, bytes: &[u8], wanted: impl Fn(usize) -> bo
 }
 
 /// The first numbers of a block's content.
-struct Head {
-    number: Option<u64>,
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Head {
+    pub(super) number: Option<u64>,
     /// The number on the grid, if all rows are there, on the grid, and every column is usual.
-    usual: Option<u64>,
-    flags: u64,
+    pub(super) usual: Option<u64>,
+    pub(super) flags: u64,
 }
 
-fn read_head(header: &Header, body: &mut Bytes<'_>) -> Result<Head, Damage> {
-    let head = body.varint()?;
-    let apart = (head >> 1 & 1) * APART;
-    let (is_old, has_flags) = (header.version == VERSION_5, head & 1 == 1);
-    let flags = match (has_flags, is_old) {
-        (false, _) => apart,
-        (true, true) => head >> 1,
-        (true, false) => match body.varint()? {
-            flags if flags & APART == 0 => flags | apart,
-            _ => return Err(Damage::Content("flags")),
-        },
-    };
-    Ok(Head {
-        number: (!is_old).then_some(head >> 2),
-        usual: (!has_flags).then_some(head >> 2),
-        flags,
-    })
-}
-
-/// Appends the first numbers of a block, which [`read_head`] reads.
-pub(super) fn push_head(body: &mut Vec<u8>, number: u64, is_usual: bool, flags: u64) {
-    let apart = u64::from(flags & APART != 0);
-    push_varint(body, 4 * number + 2 * apart + u64::from(!is_usual));
-    if !is_usual {
-        push_varint(body, flags & !APART);
+impl Head {
+    /// Writes these numbers, or reads others; those of version 5 are only read.
+    pub(super) fn code<F: Fields>(self, fields: &mut F, is_old: bool) -> Result<Self, Damage> {
+        let apart = u64::from(self.flags & APART != 0);
+        let own = 4 * self.number.unwrap_or(0) + 2 * apart + u64::from(self.usual.is_none());
+        let head = fields.varint(own)?;
+        ensure!(is_old || head >> 2 < NUMBERS, Damage::Content("number of a block"));
+        let apart = (head >> 1 & 1) * APART;
+        let has_flags = head & 1 == 1;
+        let flags = match (has_flags, is_old) {
+            (false, _) => apart,
+            (true, true) => head >> 1,
+            (true, false) => {
+                let flags = fields.varint(self.flags & !APART)?;
+                ensure!(flags & APART == 0, Damage::Content("flags"));
+                flags | apart
+            }
+        };
+        Ok(Self {
+            number: (!is_old).then_some(head >> 2),
+            usual: (!has_flags).then_some(head >> 2),
+            flags,
+        })
     }
 }
 
@@ -64,14 +63,17 @@ pub(crate) fn content_of(bytes: &[u8]) -> Result<&[u8], Damage> {
 /// The content of a block of version 5, or of an only block, as a block of this version and number: only the first numbers differ.
 pub(crate) fn renewed(header: &Header, content: &[u8], number: u64) -> Result<Vec<u8>, Damage> {
     let mut body = Bytes(content);
-    let Head { usual, flags, .. } = read_head(header, &mut body)?;
+    let Head { usual, flags, .. } = Head::default().code(&mut body, header.version == VERSION_5)?;
     let rows =
         Some(header.block_rows()).filter(|rows| *rows != header.schema.rows_per_block && flags & ROWS_FOLLOW == 0);
+    let own = Head {
+        number: Some(number),
+        usual: usual.filter(|on_grid| *on_grid == number && rows.is_none()),
+        flags: flags | if rows.is_some() { ROWS_FOLLOW } else { 0 },
+    };
     let mut content = Vec::new();
-    let is_usual = usual == Some(number) && rows.is_none();
-    let rows_follow = if rows.is_some() { ROWS_FOLLOW } else { 0 };
-    push_head(&mut content, number, is_usual, flags | rows_follow);
-    if !is_usual {
+    own.code(&mut content, false)?;
+    if own.usual.is_none() {
         rows.into_iter().for_each(|rows| push_varint(&mut content, rows as u64));
         usual.into_iter().for_each(|on_grid| push_varint(&mut content, on_grid));
     }
@@ -99,10 +101,8 @@ pub(crate) fn decode_content(header: &Header, content: &[u8], wanted: impl Fn(us
     let mut rows = header.block_rows();
     let mut descriptors: Vec<u8> = (0..columns).map(|i| plain(header, false, i)).collect();
     let mut specials = Vec::new();
-    let Head { number, usual, flags } = read_head(header, &mut body)?;
-    if flags > 63 {
-        return Err(Damage::Content("flags"));
-    }
+    let Head { number, usual, flags } = Head::default().code(&mut body, header.version == VERSION_5)?;
+    ensure!(flags <= 63, Damage::Content("flags"));
     // Without stored descriptors, columns have those of `plain`; apart, none is shared.
     if flags & APART != 0 {
         descriptors.fill(CodecId::Adaptive as u8);
@@ -113,9 +113,7 @@ pub(crate) fn decode_content(header: &Header, content: &[u8], wanted: impl Fn(us
         if flags & ROWS_FOLLOW != 0 {
             rows = body.count(rows, "number of rows")?;
         }
-        if rows == 0 {
-            return Err(Damage::Content("number of rows"));
-        }
+        ensure!(rows > 0, Damage::Content("number of rows"));
         let ticks = time::decode(TimeKind::from_bits(flags), &mut body, rows, &grid)?;
         if flags & DESCRIPTORS_FOLLOW != 0 {
             let has_own = body.take(columns.div_ceil(8))?;
@@ -198,41 +196,14 @@ fn read_section<'a>(
     descriptor: u8,
     has_length: bool,
 ) -> Result<Section<'a>, Damage> {
-    if descriptor & !DESCRIPTOR_BITS != 0 {
-        return Err(Damage::Content("descriptor"));
-    }
+    ensure!(descriptor & !DESCRIPTOR_BITS == 0, Damage::Content("descriptor"));
     let id = CodecId::from_byte(descriptor & 15)?;
     if id == CodecId::Shared {
-        if descriptor & !15 != 0 || header.start(column, None).is_none() {
-            return Err(Damage::Content("descriptor"));
-        }
+        ensure!(descriptor & !15 == 0 && header.start(column, None).is_some(), Damage::Content("descriptor"));
         let (own, others, bytes) = (None, Vec::new(), &body.0[..0]);
         return Ok(Section { id, own, others, bytes });
     }
-    let own = if descriptor & BOUND_FOLLOWS != 0 {
-        Some(short_bound(body, 0.0)?)
-    } else {
-        None
-    };
-    if own == Some(0.0) {
-        return Err(Damage::Content("bound"));
-    }
-    let mut others = Vec::new();
-    if descriptor & OTHERS_FOLLOW != 0 {
-        let count = usize::from(body.byte()?) + 1;
-        if count > JOINT_COLUMNS {
-            return Err(Damage::Content("number of other columns"));
-        }
-        for _ in 0..count {
-            let back = body.count(column, "another column")?;
-            others.push(
-                column
-                    .checked_sub(back)
-                    .filter(|_| back > 0)
-                    .ok_or(Damage::Content("another column"))?,
-            );
-        }
-    }
+    let (own, others) = front(body, column, descriptor, None, &[])?;
     let length = if has_length {
         body.count(body.0.len(), "length of a column")?
     } else {
@@ -244,6 +215,32 @@ fn read_section<'a>(
         others,
         bytes: body.take(length)?,
     })
+}
+
+/// What stands in front of a column's bytes, as its descriptor says: its own bound, and the columns that it was predicted from.
+pub(super) fn front<F: Fields>(
+    fields: &mut F,
+    column: usize,
+    descriptor: u8,
+    own: Option<f64>,
+    others: &[usize],
+) -> Result<(Option<f64>, Vec<usize>), Damage> {
+    let (mut bound, mut found) = (None, Vec::new());
+    if descriptor & BOUND_FOLLOWS != 0 {
+        bound = Some(short_bound(fields, own.unwrap_or(0.0))?);
+        ensure!(bound != Some(0.0), Damage::Content("bound"));
+    }
+    if descriptor & OTHERS_FOLLOW != 0 {
+        let count = usize::from(fields.byte(others.len().saturating_sub(1) as u8)?) + 1;
+        ensure!(count <= JOINT_COLUMNS, Damage::Content("number of other columns"));
+        for i in 0..count {
+            let back = others.get(i).map_or(0, |other| column - other);
+            let back = fields.count(back, column, "another column")?;
+            let other = column.checked_sub(back).filter(|_| back > 0);
+            found.push(other.ok_or(Damage::Content("another column"))?);
+        }
+    }
+    Ok((bound, found))
 }
 
 impl Section<'_> {

@@ -8,7 +8,7 @@
 
 use super::{Cells, aligned};
 use crate::codec::{JOINT_COLUMNS, adaptive};
-use crate::error::Damage;
+use crate::error::{Damage, ensure};
 use crate::header::Header;
 use crate::related;
 use crate::specials::{self, Specials};
@@ -61,9 +61,7 @@ fn others<C: Coder>(coder: &mut C, column: usize, wanted: &[usize]) -> Result<Ve
         return Ok(Vec::new());
     }
     let count = coder.raw((wanted.len() as u64).saturating_sub(1), NUMBER_BITS) as usize + 1;
-    if count > JOINT_COLUMNS {
-        return Err(Damage::Content("number of other columns"));
-    }
+    ensure!(count <= JOINT_COLUMNS, Damage::Content("number of other columns"));
     let other = |i: usize| {
         let distance = wanted.get(i).map_or(0, |other| (column - other - 1) as u64);
         let distance = coder.raw(distance, DISTANCE_BITS) as usize + 1;
@@ -131,8 +129,6 @@ pub(super) fn decode(
     let indices = codec
         .code_shared(reader, &start, None, count, &values)
         .map_err(|_| damaged)?;
-    if reader.overran() {
-        return Err(damaged);
-    }
+    ensure!(!reader.overran(), damaged);
     Ok(specials::merged(specials, &adaptive::restored(start.values(&indices), &target)))
 }

@@ -1,6 +1,6 @@
 //! Encoding of a block.
 
-use super::read::{decode_content, push_head};
+use super::read::{Head, decode_content, front};
 use super::{
     APART, BOUND_FOLLOWS, Cells, DESCRIPTORS_FOLLOW, OTHERS_FOLLOW, ROWS_FOLLOW, SHARED_COLUMNS, SPECIALS_FOLLOW,
     aligned, plain, shared,
@@ -10,7 +10,7 @@ use crate::header::Header;
 use crate::related;
 use crate::specials::{self, Special, Specials};
 use crate::time::{self, TimeKind};
-use crate::wire::{Bytes, checked, push_varint};
+use crate::wire::{Bytes, checked, push_varint, written};
 use fewbits_block_codec::Effort;
 
 struct CodedColumn {
@@ -73,19 +73,9 @@ fn encode_column(
             *special = Some(Special::Whole(sample.to_bits()));
         }
     }
-    let mut descriptor = coded.id as u8;
-    let mut head = Vec::new();
-    if let Some(bound) = own {
-        descriptor |= BOUND_FOLLOWS;
-        head.extend_from_slice(&bound.to_be_bytes()[..3]);
-    }
-    if !others.is_empty() {
-        descriptor |= OTHERS_FOLLOW;
-        head.push((others.len() - 1) as u8);
-        others
-            .iter()
-            .for_each(|other| push_varint(&mut head, (column - other) as u64));
-    }
+    let flag = |given: bool, flag: u8| if given { flag } else { 0 };
+    let descriptor = coded.id as u8 | flag(own.is_some(), BOUND_FOLLOWS) | flag(!others.is_empty(), OTHERS_FOLLOW);
+    let head = written(|fields| front(fields, column, descriptor, own, &others));
     CodedColumn {
         descriptor,
         head,
@@ -147,7 +137,6 @@ impl Rows<'_> {
         let shares = coded.iter().any(|column| column.indices.is_some());
         let apart = !shares && header.has_starts();
         let (kind, time) = time::encode(ticks, &header.grid());
-        let mut body = Vec::new();
         let has_own: Vec<bool> = (0..)
             .zip(&coded)
             .map(|(i, column)| column.descriptor != plain(header, apart, i))
@@ -166,7 +155,12 @@ impl Rows<'_> {
             | flag(told, SPECIALS_FOLLOW);
         // Nothing else follows the number of a block that stands there on the grid too.
         let is_usual = flags == TimeKind::Grid as u64 && Bytes(&time).varint() == Ok(number);
-        push_head(&mut body, number, is_usual, flags | flag(apart, APART));
+        let head = Head {
+            number: Some(number),
+            usual: is_usual.then_some(number),
+            flags: flags | flag(apart, APART),
+        };
+        let mut body = written(|fields| head.code(fields, false));
         if !is_usual {
             if !whole {
                 push_varint(&mut body, ticks.len() as u64);

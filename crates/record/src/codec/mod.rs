@@ -31,13 +31,8 @@ pub(crate) enum CodecId {
 
 impl CodecId {
     pub(crate) fn from_byte(byte: u8) -> Result<Self, Damage> {
-        Ok(match byte {
-            0 => Self::Raw,
-            1 => Self::Constant,
-            2 => Self::Adaptive,
-            3 => Self::Shared,
-            _ => return Err(Damage::Content("codec")),
-        })
+        let all = [Self::Raw, Self::Constant, Self::Adaptive, Self::Shared];
+        all.get(usize::from(byte)).copied().ok_or(Damage::Content("codec"))
     }
 }
 

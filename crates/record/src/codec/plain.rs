@@ -2,7 +2,7 @@
 
 use super::Target;
 use crate::bound::Bound;
-use crate::error::Damage;
+use crate::error::{Damage, ensure};
 
 pub(super) fn raw(samples: &[f64]) -> Vec<u8> {
     samples.iter().flat_map(|sample| sample.to_le_bytes()).collect()
@@ -10,9 +10,7 @@ pub(super) fn raw(samples: &[f64]) -> Vec<u8> {
 
 pub(super) fn decode_raw(bytes: &[u8], count: usize) -> Result<Vec<f64>, Damage> {
     let (chunks, rest) = bytes.as_chunks::<8>();
-    if chunks.len() != count || !rest.is_empty() {
-        return Err(Damage::Content("length of raw samples"));
-    }
+    ensure!(chunks.len() == count && rest.is_empty(), Damage::Content("length of raw samples"));
     Ok(chunks.iter().map(|chunk| f64::from_le_bytes(*chunk)).collect())
 }
 

@@ -1,6 +1,6 @@
 //! A piece of the header as a frame.
 
-use crate::error::Damage;
+use crate::error::{Damage, ensure};
 use crate::wire::{Bytes, push_varint, read_checked};
 
 const PIECE: u8 = b'P';
@@ -37,24 +37,16 @@ impl<'a> Piece<'a> {
     }
 
     pub(super) fn of_frame(frame: &'a [u8]) -> Result<Self, Damage> {
-        if frame.get(1) != Some(&PIECE) {
-            return Err(Damage::NoBlock);
-        }
+        ensure!(frame.get(1) == Some(&PIECE), Damage::NoBlock);
         // The receiver of a piece has no header yet, so the checksum covers zeros in place of the header's.
         let (content, whole) = read_checked(0, frame, 2, 0..=frame.len())?;
-        if whole != frame.len() {
-            return Err(Damage::Content("length"));
-        }
+        ensure!(whole == frame.len(), Damage::Content("length"));
         let mut content = Bytes(content);
         let check = u32::from_le_bytes(content.array()?);
         let [last, number] = content.array()?;
-        if number > last {
-            return Err(Damage::Content("number of a piece"));
-        }
+        ensure!(number <= last, Damage::Content("number of a piece"));
         let frames = content.varint()?;
-        if frames > MAX_COUNT {
-            return Err(Damage::Content("number of frames"));
-        }
+        ensure!(frames <= MAX_COUNT, Damage::Content("number of frames"));
         let bytes = content.0;
         Ok(Self {
             check,

@@ -3,7 +3,7 @@
 use super::max_rows;
 use super::piece::Piece;
 use crate::block::{self, Block};
-use crate::error::{Damage, Error};
+use crate::error::{Damage, Error, ensure};
 use crate::header::{Header, MAX_HEADER};
 use crate::header_bytes::Known;
 use crate::schema::Schema;
@@ -178,9 +178,7 @@ impl FrameReader {
         incomplete.frames = incomplete.frames.max(piece.frames);
         incomplete.pieces[usize::from(piece.number)] = Some(piece.bytes.to_vec());
         let bytes: usize = incomplete.pieces.iter().flatten().map(Vec::len).sum();
-        if bytes > MAX_HEADER {
-            return Err(Damage::Content("length of the header"));
-        }
+        ensure!(bytes <= MAX_HEADER, Damage::Content("length of the header"));
         if incomplete.pieces.iter().any(Option::is_none) {
             if self.incomplete.len() == MAX_INCOMPLETE {
                 self.incomplete.remove(0);
@@ -193,9 +191,8 @@ impl FrameReader {
             Ok(Known::Header(header)) if header.length == bytes.len() && header.check == piece.check => *header,
             _ => return Err(Damage::Content("header")),
         };
-        if header.schema.rows_per_block > max_rows(header.schema.columns.len()) {
-            return Err(Damage::Content("rows per frame"));
-        }
+        let most = max_rows(header.schema.columns.len());
+        ensure!(header.schema.rows_per_block <= most, Damage::Content("rows per frame"));
         self.sent = incomplete.frames;
         self.incomplete.clear();
         self.waiting_bytes = 0;
@@ -214,8 +211,6 @@ impl FrameReader {
 }
 
 fn read_block(header: &Header, frame: &[u8]) -> Result<Block, Damage> {
-    if block::length(header, frame)? != frame.len() {
-        return Err(Damage::Content("length"));
-    }
+    ensure!(block::length(header, frame)? == frame.len(), Damage::Content("length"));
     block::decode(header, frame, |_| true)
 }

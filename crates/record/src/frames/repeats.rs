@@ -2,7 +2,7 @@
 
 use super::writer::FrameWriter;
 use crate::error::Error;
-use fewbits_block_codec::ArgumentError;
+use fewbits_block_codec::ensure;
 
 /// Whole headers that may be sent in addition to the stated share of the bytes: the first, three more soon after it, and two at the end.
 const FREE: usize = 4;
@@ -39,9 +39,7 @@ impl HeaderRepeats {
     /// # Errors
     /// If `share` is not from 0 to 0.5.
     pub fn share(share: f64) -> Result<Self, Error> {
-        if !(0.0..=0.5).contains(&share) {
-            return Err(ArgumentError::new("share of the header", share, "0 to 0.5").into());
-        }
+        ensure!((0.0..=0.5).contains(&share), "share of the header", share, "0 to 0.5");
         Ok(Self::new(Pace::Share(share)))
     }
 
@@ -50,9 +48,7 @@ impl HeaderRepeats {
     /// # Errors
     /// If `frames` is 0.
     pub fn every(frames: u64) -> Result<Self, Error> {
-        if frames == 0 {
-            return Err(ArgumentError::new("frames between headers", frames, "1 or more").into());
-        }
+        ensure!(frames > 0, "frames between headers", frames, "1 or more");
         Ok(Self::new(Pace::Every(frames)))
     }
 

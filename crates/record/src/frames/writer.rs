@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::header::{Form, Header, MAX_START};
 use crate::schema::Schema;
 use crate::waiting::Waiting;
-use fewbits_block_codec::{ArgumentError, Effort};
+use fewbits_block_codec::{ArgumentError, Effort, ensure};
 
 /// Smallest allowed maximal length of a frame: a piece then has 20 bytes of the header.
 pub const MIN_FRAME_BYTES: usize = 40;
@@ -45,9 +45,7 @@ impl FrameWriter {
         // Origin and step of rows take at most 18 bytes more than those of no rows.
         let header = Header::new(schema.clone(), &[], vec![0.0; columns]).to_bytes().len() + 32 + MAX_START * columns;
         let least = (header.div_ceil(MAX_PIECES) + PIECE_OVERHEAD).max(MIN_FRAME_BYTES);
-        if max_bytes < least {
-            return Err(ArgumentError::new("max_bytes", max_bytes, format!("at least {least} for this header")).into());
-        }
+        ensure!(max_bytes >= least, "max_bytes", max_bytes, format!("at least {least} for this header"));
         Ok(Self {
             header: None,
             max_bytes,
@@ -194,9 +192,7 @@ impl FrameWriter {
                     .with_form(Form::Stream),
             );
         }
-        let Some(header) = &self.header else {
-            return Err(Error::Broken);
-        };
+        let header = self.header.as_ref().ok_or(Error::Broken)?;
         let rows = self.rows.first(rows, header, self.frames, Effort::Thorough);
         Ok(rows.block().0)
     }
