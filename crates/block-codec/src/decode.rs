@@ -7,7 +7,7 @@ use crate::head::{Coding, Head};
 use crate::indices::{code_block, from_pco_bytes, from_wrapped_pco, raw_samples};
 use crate::rows::Others;
 use crate::sections::SECTIONS;
-use crate::{BlockCodec, Error, check_rows, levels, stored};
+use crate::{BlockCodec, Error, check_rows, learned, levels, stored};
 
 impl BlockCodec {
     /// The samples of a block of `rows` rows.
@@ -44,7 +44,8 @@ impl BlockCodec {
         let others = joint_columns(&head, others)?;
         let keys = match head.coding {
             Coding::Levels => Some(Reader::all(rest, |coder| levels::code(coder, true, None, rows, others.as_ref()))?),
-            Coding::StoredLevels => Some(levels::read_tabled(rest, rows)?),
+            Coding::TabledLevels => Some(levels::read_tabled(rest, rows, learned::read)?),
+            Coding::StoredLevels => Some(levels::read_tabled(rest, rows, stored::read)?),
             _ => None,
         };
         let Some(grid) = head.grid else {
@@ -61,6 +62,7 @@ impl BlockCodec {
                 Reader::all(rest, |coder| code_block(coder, by_models, &grid, None, rows, others.as_ref()))?
             }
             Coding::Wrapped => from_wrapped_pco::<i64>(rest, rows)?,
+            Coding::Tables => learned::read(rest, rows)?,
             Coding::Stored => stored::read(rest, rows)?,
             _ => match keys {
                 Some(keys) => keys.into_iter().map(levels::index_of_key).collect(),

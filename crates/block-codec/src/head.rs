@@ -11,17 +11,16 @@ pub(crate) const LINE: u8 = 13;
 pub(crate) const CIRCLE: u8 = 14;
 pub(crate) const SAMPLES: u8 = 15;
 
-/// Flags of the second byte: exceptions; steps; an anchor; a phase; decimals are rounded to single precision; pco is in its wrapped form; stored
-/// tables are in place of the counts, or follow the list of levels.
+/// Flags of the second byte: exceptions; steps; an anchor; a phase; decimals are rounded to single precision; pco is in its wrapped form; tables
+/// that learn follow the counts, or the list of levels; stored tables are in place of the counts, or follow the list of levels.
 const EXCEPTIONS: u8 = 1;
 pub(crate) const STEPS: u8 = 2;
 const ANCHOR: u8 = 4;
 pub(crate) const PHASE: u8 = 8;
 pub(crate) const SINGLE: u8 = 16;
 const WRAPPED: u8 = 32;
-const STORED: u8 = 128;
-/// Flags of codings, of which one is free.
-const FORMS: u8 = 0xe0;
+pub(crate) const TABLED: u8 = 64;
+pub(crate) const STORED: u8 = 128;
 
 /// How the indices are coded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,8 +29,12 @@ pub(crate) enum Coding {
     Pco,
     Raw,
     Counts,
+    /// Counts, then tables of symbols that learn. Not written.
+    Tables,
     /// A list of levels, and their numbers.
     Levels,
+    /// A list of levels, and tables that learn for their numbers. Not written.
+    TabledLevels,
     /// Tables of symbols that the block stores.
     Stored,
     /// A list of levels, and stored tables for their numbers.
@@ -46,14 +49,17 @@ const CODINGS: &[(Coding, u8, u8)] = &[
     (Coding::Pco, 1, 0),
     (Coding::Wrapped, 1, WRAPPED),
     (Coding::Levels, 2, 0),
+    (Coding::TabledLevels, 2, TABLED),
     (Coding::StoredLevels, 2, STORED),
     (Coding::Counts, 3, 0),
+    (Coding::Tables, 3, TABLED),
     (Coding::Stored, 3, STORED),
 ];
 
 /// The same of samples.
 const CODINGS_OF_SAMPLES: &[(Coding, u8, u8)] = &[
     (Coding::Levels, 0, 0),
+    (Coding::TabledLevels, 0, TABLED),
     (Coding::StoredLevels, 0, STORED),
     (Coding::Pco, 1, 0),
     (Coding::Raw, 2, 0),
@@ -148,7 +154,7 @@ impl BlockCodec {
         let second = flags | form | u8::from(!own.exceptions.is_empty());
         let head = fields.byte(kind | bits << 4 | u8::from(own.joint) << 6 | u8::from(second != 0) << 7)?;
         let second = if head & 128 == 0 { 0 } else { fields.byte(second)? };
-        let (kind, joint, form) = (head & 15, head & 64 != 0, second & FORMS);
+        let (kind, joint, form) = (head & 15, head & 64 != 0, second & (WRAPPED | TABLED | STORED));
         let found = codings(kind)
             .iter()
             .find(|(_, bits, own)| (head >> 4 & 3, form) == (*bits, *own));
@@ -157,7 +163,7 @@ impl BlockCodec {
         };
         if (head & 128 != 0 && second == 0)
             || (kind == SAMPLES && (second != form || (joint && coding != Coding::Levels)))
-            || (joint && form == STORED)
+            || (joint && form & (TABLED | STORED) != 0)
         {
             return Err(Damaged::new(
                 "second byte",

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! With tables the arithmetic code has the list alone (from "number of levels" to "distances"). In front of it stands its length in bytes, a
-//! varint; behind it are the numbers of all rows as in module `stored`.
+//! varint; behind it are the numbers of all rows as in module `stored` (`learned` in blocks that say so).
 //!
 //! A level is an index of the block's grid, or a sample itself; both are mapped to unsigned integers of the same order.
 
@@ -215,12 +215,16 @@ pub(crate) fn write_tabled(
     stored::write(numbers, plan, head)
 }
 
-/// The keys of all rows of a block of [`write_tabled`].
-pub(crate) fn read_tabled(bytes: &[u8], rows: usize) -> Result<Vec<u64>, Damaged> {
+/// The keys of all rows of a block of [`write_tabled`], whose numbers `read` reads.
+pub(crate) fn read_tabled(
+    bytes: &[u8],
+    rows: usize,
+    read: fn(&[u8], usize) -> Result<Vec<i64>, Damaged>,
+) -> Result<Vec<u64>, Damaged> {
     let mut bytes = Bytes(bytes);
     let length = bytes.count(usize::MAX, "length of levels")?;
     let levels = Reader::all(bytes.take(length)?, |coder| code_levels(coder, None, rows))?;
-    let numbers = stored::read(bytes.0, rows)?;
+    let numbers = read(bytes.0, rows)?;
     let level = |number: i64| usize::try_from(number).ok().and_then(|number| levels.get(number));
     let levels = numbers.into_iter().map(|number| level(number).copied());
     levels.collect::<Option<_>>().ok_or_else(beyond_the_list)

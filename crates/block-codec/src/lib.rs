@@ -20,13 +20,13 @@
 //! | part | bytes | when |
 //! |---|---|---|
 //! | head | 1 | always: low 4 bits the grid (0 to 12: decimals of the samples; 13: line; 14: circle; 15: the samples themselves), then 2 bits the coding (0: models, of samples levels; 1: pco; 2: levels, of samples as they are; 3: counts, of samples wrapped pco), 1 bit joint, 1 bit whether a second byte follows |
-//! | second | 1 | bit 0: exceptions; bit 1: steps; bit 2: anchor; bit 3: phase; bit 4: decimals are rounded to single precision; bit 5: pco is in its wrapped form; bit 7: stored tables are in place of the counts, or follow the list of levels (levels of samples have a second byte only with one of these) |
+//! | second | 1 | bit 0: exceptions; bit 1: steps; bit 2: anchor; bit 3: phase; bit 4: decimals are rounded to single precision; bit 5: pco is in its wrapped form; bit 6: counts, or the list of levels, are followed by tables that learn (read only); bit 7: stored tables are in place of the counts, or follow the list of levels (levels of samples have a second byte only with one of these) |
 //! | steps | 2 varints | unit and origin (zigzag) in units of the last decimal |
 //! | anchor | 8 | a point of the line, little-endian; otherwise zero is one |
 //! | phase | 1 | the grid of a line, or of cells of several decimals, is moved by so many sixteenths of a cell (1 to 15; whole decimals, rounded up) |
 //! | exceptions | varints and 8 each | number; rows since the last one; the sample |
 //! | sections | the rest | in place of all others behind the bytes 8f c0, module `sections`: rows whose kind changes, written with [`Effort::Fast`] |
-//! | indices | the rest | models: 6 bits length (48 more if contexts have the lengths of rests: of blocks of 1024 rows or more, where the length is below 16) and as many bits of the first index (zigzag), then decisions (`model.rs`), all arithmetic coded; counts: the same with a bit behind the first index (1: differences of differences) and other decisions (`counts.rs`); tables: module `stored`; levels: module `levels`; pco: its standalone or, as written since version 6 of recordings, its wrapped format with one chunk and one page |
+//! | indices | the rest | models: 6 bits length (48 more if contexts have the lengths of rests: of blocks of 1024 rows or more, where the length is below 16) and as many bits of the first index (zigzag), then decisions (`model.rs`), all arithmetic coded; counts: the same with a bit behind the first index (1: differences of differences) and other decisions (`counts.rs`); tables: module `stored`, or `learned`; levels: module `levels`; pco: its standalone or, as written since version 6 of recordings, its wrapped format with one chunk and one page |
 //!
 //! There is no checksum, no length and no number of rows: the container must store all three. An arithmetic code has no redundancy, so most
 //! truncated or damaged blocks decode to wrong samples. Trailing bytes are detected and refused (behind tables, from eight on, nearly always).
@@ -45,6 +45,7 @@ mod groups;
 mod head;
 mod indices;
 mod lanes;
+mod learned;
 mod levels;
 mod mixer;
 mod model;

@@ -7,13 +7,13 @@
 
 use crate::bytes::{Bytes, push_varint};
 use crate::groups::joined;
-use crate::head::SAMPLES;
+use crate::head::{SAMPLES, STORED, TABLED};
 use crate::vectors::narrow;
 use crate::{BlockCodec, Error};
 use fewbits_node::elementary::log2;
 
-/// The first bytes of a block of sections. No head has these two flags in its second byte.
-pub(crate) const SECTIONS: [u8; 2] = [SAMPLES | 128, 0xc0];
+/// The first bytes of a block of sections.
+pub(crate) const SECTIONS: [u8; 2] = [SAMPLES | 128, TABLED | STORED];
 
 /// Rows of a piece, at whose ends sections may end.
 const PIECE: usize = 2048;

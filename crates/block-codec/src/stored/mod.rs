@@ -26,12 +26,12 @@
 mod alphabet;
 mod lane;
 mod lanes;
-mod order;
+pub(crate) mod order;
 mod plan;
 #[cfg(test)]
 mod tests;
 mod weights;
-mod words;
+pub(crate) mod words;
 
 use crate::arithmetic::{Coder, Reader, Writer};
 use crate::bytes::{Bytes, push_varint};

@@ -9,19 +9,19 @@ use crate::error::{Damaged, ensure};
 use std::hint::select_unpredictable;
 
 /// Lanes that are coded side by side.
-pub(super) const LANES: usize = 4;
+pub(crate) const LANES: usize = 4;
 /// Smallest state.
-pub(super) const LOW: u32 = 1 << WORD_BITS;
-pub(super) const WORD_BITS: u32 = 16;
+pub(crate) const LOW: u32 = 1 << WORD_BITS;
+pub(crate) const WORD_BITS: u32 = 16;
 /// Rows of a stretch.
-pub(super) const STRETCH: usize = 512;
+pub(crate) const STRETCH: usize = 512;
 /// Bits of the number of pads (words of three lanes and the state of the first one), and of that and the number of words modulo 4. Without
 /// the latter, a word too many or too few is rarely taken for a part of other rows.
-pub(super) const PAD_BITS: u32 = 3;
-pub(super) const HEAD_BITS: u32 = PAD_BITS + 2;
+pub(crate) const PAD_BITS: u32 = 3;
+pub(crate) const HEAD_BITS: u32 = PAD_BITS + 2;
 
 /// Lengths of the stretches that four lanes take at a time.
-pub(super) fn stretches(rows: usize) -> impl DoubleEndedIterator<Item = usize> {
+pub(crate) fn stretches(rows: usize) -> impl DoubleEndedIterator<Item = usize> {
     let full = rows / (LANES * STRETCH);
     let rest = (rows - full * LANES * STRETCH) / LANES;
     std::iter::repeat_n(STRETCH, full).chain((rest > 0).then_some(rest))
@@ -30,7 +30,7 @@ pub(super) fn stretches(rows: usize) -> impl DoubleEndedIterator<Item = usize> {
 /// Makes the widths of symbols (of at most 64) fill all slots: the largest gives or takes what is left. While there are too many it has
 /// `slots / 64` at least, so each round takes some.
 #[inline(always)]
-pub(super) fn fill_slots(widths: &mut [u32], slots: usize) {
+pub(crate) fn fill_slots(widths: &mut [u32], slots: usize) {
     let mut over = widths.iter().sum::<u32>() as i32 - slots as i32;
     while over != 0 {
         // Width and place of the first of the largest ones in one number.
@@ -43,20 +43,20 @@ pub(super) fn fill_slots(widths: &mut [u32], slots: usize) {
     }
 }
 
-pub(super) fn cut_off() -> Damaged {
+pub(crate) fn cut_off() -> Damaged {
     Damaged::new("block", "other words", "those that a writer of as many rows wrote")
 }
 
 /// The words that all lanes read in turn.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Words<'a> {
+pub(crate) struct Words<'a> {
     words: &'a [[u8; 2]],
     position: usize,
     broken: bool,
 }
 
 impl<'a> Words<'a> {
-    pub(super) fn new(words: &'a [[u8; 2]]) -> Self {
+    pub(crate) fn new(words: &'a [[u8; 2]]) -> Self {
         Self {
             words,
             position: 0,
@@ -65,12 +65,12 @@ impl<'a> Words<'a> {
     }
 
     /// Notes that what was read is not what a writer writes.
-    pub(super) fn refuse(&mut self) {
+    pub(crate) fn refuse(&mut self) {
         self.broken = true;
     }
 
     /// The states of the lanes and the words behind them, whose number modulo 4 is stated.
-    pub(super) fn begun(mut bytes: Bytes<'a>, count: u64) -> Result<([u32; LANES], Self), Damaged> {
+    pub(crate) fn begun(mut bytes: Bytes<'a>, count: u64) -> Result<([u32; LANES], Self), Damaged> {
         let mut states = [0; LANES];
         for state in &mut states {
             *state = u32::from_le_bytes(bytes.array()?);
@@ -84,18 +84,18 @@ impl<'a> Words<'a> {
     }
 
     /// Number of all words.
-    pub(super) fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.words.len()
     }
 
     /// Checks what four stretches leave, so that time and memory are in proportion to the bytes.
-    pub(super) fn check(&self, states: &[u32; LANES]) -> Result<(), Damaged> {
+    pub(crate) fn check(&self, states: &[u32; LANES]) -> Result<(), Damaged> {
         ensure!(!self.broken && states.iter().all(|state| *state >= LOW), cut_off());
         Ok(())
     }
 
     /// The words of the tail: those that the states of the lanes 1 to 3 hold, and those that were not read.
-    pub(super) fn late(&self, states: &[u32; LANES]) -> Result<Vec<[u8; 2]>, Damaged> {
+    pub(crate) fn late(&self, states: &[u32; LANES]) -> Result<Vec<[u8; 2]>, Damaged> {
         let held = &states[1..];
         ensure!(held.iter().all(|state| *state < 2 * LOW), cut_off());
         let rest = self.words[self.position..].iter().copied();
@@ -107,17 +107,17 @@ impl<'a> Words<'a> {
     }
 
     /// Whether a tail that began with this word for pads ended as writers end it.
-    pub(super) fn is_ended(&self, pads: u64, state: u32) -> bool {
+    pub(crate) fn is_ended(&self, pads: u64, state: u32) -> bool {
         pads == 0 && !self.broken && self.position == self.words.len() && state == 1
     }
 
     /// All pads together, of the number in the head.
-    pub(super) fn pads(&mut self, state: &mut u32, head: u64) -> u64 {
+    pub(crate) fn pads(&mut self, state: &mut u32, head: u64) -> u64 {
         (0..head & ((1 << PAD_BITS) - 1)).fold(0, |all, _| all | self.raw(state, WORD_BITS))
     }
 
     #[inline(always)]
-    pub(super) fn refilled(&mut self, state: u32) -> u32 {
+    pub(crate) fn refilled(&mut self, state: u32) -> u32 {
         let Some(word) = self.words.get(self.position) else {
             return state;
         };
@@ -128,7 +128,7 @@ impl<'a> Words<'a> {
 
     /// At most 16 raw bits.
     #[inline(always)]
-    pub(super) fn raw(&mut self, state: &mut u32, bits: u32) -> u64 {
+    pub(crate) fn raw(&mut self, state: &mut u32, bits: u32) -> u64 {
         let value = *state & ((1 << bits) - 1);
         *state = self.refilled(*state >> bits);
         u64::from(value)
@@ -136,7 +136,7 @@ impl<'a> Words<'a> {
 
     /// Raw bits, the lowest 16 first.
     #[inline(always)]
-    pub(super) fn long_raw(&mut self, state: &mut u32, bits: u32) -> u64 {
+    pub(crate) fn long_raw(&mut self, state: &mut u32, bits: u32) -> u64 {
         let (mut value, mut done) = (0, 0);
         while done < bits {
             let count = (bits - done).min(WORD_BITS);

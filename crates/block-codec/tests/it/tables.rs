@@ -145,6 +145,31 @@ fn has_tabled_levels(bytes: &[u8]) -> bool {
     [0x20, 0].contains(&(bytes[0] & 0x30)) && bytes[0] & 0x80 != 0 && bytes[1] & 0x80 != 0
 }
 
+/// Blocks of the corpus of recordings whose tables learn: no writer makes them.
+#[test]
+fn learned_tables_are_read_and_damage_is_total() {
+    let coarse = |bound| BlockCodec::new(bound).unwrap();
+    for (bytes, codec) in [
+        (&include_bytes!("learned-differences.bin")[..], coarse(2.0)),
+        (include_bytes!("learned-values.bin"), coarse(16.0)),
+        (include_bytes!("learned-levels.bin"), BlockCodec::lossless()),
+    ] {
+        assert_eq!(codec.decode(bytes, 5000).unwrap().len(), 5000);
+        for rows in [1, 2047, 4999, 5001, 1 << 40, usize::MAX] {
+            assert!(codec.decode(bytes, rows).is_err(), "{rows}");
+        }
+        for bit in (0..8 * bytes.len()).step_by(11) {
+            let mut flipped = bytes.to_vec();
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            for damaged in [&flipped, &bytes[..bit / 8]] {
+                if let Ok(values) = codec.decode(damaged, 5000) {
+                    assert_eq!(values.len(), 5000);
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn few_uneven_levels_have_a_list_and_tables() {
     let samples = uneven(3000);
