@@ -6,7 +6,7 @@ use crate::observation_model::ObservationModel;
 use crate::system::{SensorGroup, System};
 use fewbits_core::Link;
 use fewbits_numerics::error::entries;
-use fewbits_quantizers::quantizer::check_increasing;
+use fewbits_quantizers::quantizer::{cell_of, check_increasing};
 use fewbits_quantizers::{Channel, Quantizer, lloyd_max};
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +27,14 @@ pub struct SensorDesign {
 }
 
 impl SensorDesign {
+    /// The word for a sample.
+    ///
+    /// # Errors
+    /// If the sample is NaN.
+    pub fn encode(&self, sample: f64) -> Result<usize, Error> {
+        Ok(self.words[cell_of(&self.breakpoints, sample)?])
+    }
+
     /// Number of symbols that can be received: all words, and one more after them, "nothing", if a word may be missing.
     pub fn symbols(&self) -> usize {
         (1 << self.bits) + usize::from(missing(&self.link) > 0.0)

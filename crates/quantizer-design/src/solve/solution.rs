@@ -12,7 +12,6 @@ use crate::observation_model::ObservationModel;
 use crate::system::System;
 use fewbits_core::Link;
 use fewbits_numerics::error::entries;
-use fewbits_quantizers::quantizer::cell_of;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
@@ -182,7 +181,7 @@ impl Solution {
         self.sensors
             .iter()
             .zip(samples)
-            .map(|(sensor, y)| Ok(sensor.words[cell_of(&sensor.breakpoints, *y)?]))
+            .map(|(sensor, y)| sensor.encode(*y))
             .collect()
     }
 
