@@ -23,6 +23,9 @@ pub struct Network<S, const D: usize, const M: usize> {
     format: NumberFormat,
 }
 
+/// One observation per sensor, and the number of reports that were sent.
+pub type Transmitted<const M: usize> = (Vec<Observation<SVector<f64, M>>>, usize);
+
 /// A sensor of a [`Network`] as a fusion centre knows it, with the scheme `C` and the feedback `A`.
 pub type Remote<S, C, A, const D: usize, const M: usize> = Reporting<S, C, fn(&Gaussian<D>, &Gaussian<M>) -> A, M>;
 
@@ -111,7 +114,7 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
         rules: &[CensoringRule<M>],
         broadcast: &SVector<f64, D>,
         measurements: &[SVector<f64, M>],
-    ) -> Result<(Vec<Observation<SVector<f64, M>>>, usize), Error> {
+    ) -> Result<Transmitted<M>, Error> {
         self.count(rules.len(), measurements.len())?;
         let mut sent = 0;
         let observations = (0..self.sensors.len()).map(|i| {

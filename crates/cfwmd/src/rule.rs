@@ -11,8 +11,7 @@ use serde::{Deserialize, Serialize};
 
 /// Send if and only if `nu' S^-1 nu >= eta`, with the innovation `nu = z - prediction`.
 ///
-/// For scalar measurements this rule is equivalent to one that sends if the posterior's Kullback-Leibler divergence is large; see
-/// [`information`](crate::information).
+/// For scalar measurements this rule is equivalent to one that sends if the posterior's Kullback-Leibler divergence is large.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Ellipsoid<M>", into = "Ellipsoid<M>")]
 pub struct CensoringRule<const M: usize> {

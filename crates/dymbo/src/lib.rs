@@ -6,8 +6,8 @@
 //! and Roumeliotis call it the sign-of-innovations filter; the paper that this crate follows calls it Dymbo.
 //!
 //! The filters keep **a mean and a variance and use closed forms**: no particles, no grid, no table. The variances do not depend on
-//! the data. The cost: the belief is a normal density with the posterior's moments, not the exact posterior. That
-//! adds to the mean squared error 0.02 % for the paper's parameters, at most 0.14 % for `|a| <= 1`, `gamma <= 1`. A
+//! the data. The cost: the belief is a normal density with the posterior's moments, not the exact posterior. [`chain`]
+//! computes what that adds to the mean squared error: 0.02 % for the paper's parameters, at most 0.14 % for `|a| <= 1`, `gamma <= 1`. A
 //! better estimator from the same bits can gain no more.
 //!
 //! | task | item |
@@ -16,7 +16,7 @@
 //! | the filter, one bit | [`DymboFilter`] |
 //! | several bits per sample, several sensors, vector states | [`MultibitFilter`], [`ParallelFilter`], the factor of [`SignBit`] in any filter of `fewbits_filters` |
 //! | one slot of sensor, link and filter in one call | [`ScalarFilter::exchange`] |
-//! | expected errors | [`ScalarPlant::steady_state`], [`ScalarPlant::loss`] |
+//! | expected errors | [`ScalarPlant::steady_state`], [`ScalarPlant::loss`] (closed forms), [`chain`] (exact errors) |
 //!
 //! The likelihood of a report is a [`Factor`](fewbits_core::Factor), for any threshold and any [`Link`](fewbits_core::Link).
 //! `fewbits_filters::assumed_density::update` applies it to a Gaussian belief; the filters here are closed forms of that update. A
@@ -43,6 +43,7 @@
 //!
 //! Not here: energy and radio (`fewbits-network`), and the choice of which sensor reports (`fewbits-sensor-assignment`).
 
+pub mod chain;
 mod filter;
 mod first_message;
 mod innovation_word;
@@ -50,6 +51,7 @@ mod multibit;
 mod parallel;
 mod plant;
 pub mod sign_bit;
+pub mod steady;
 
 pub use fewbits_core::Error;
 pub use filter::{DymboFilter, ScalarFilter, StepInfo};

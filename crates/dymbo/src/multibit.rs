@@ -85,9 +85,14 @@ impl MultibitFilter {
             ..self
         }
     }
+
+    /// Per word: `E[z | word received]` and the word's probability, `z` the normalised innovation.
+    pub(crate) fn levels(&self) -> &[(f64, f64)] {
+        &self.levels
+    }
 }
 
-/// Per word: `E[z | word received]` and the word's probability, `z` the normalised innovation, for a link that may invert bits.
+/// Computes [`MultibitFilter::levels`] for a link that may invert bits.
 fn levels(scheme: &InnovationWord, link: &Link) -> Vec<(f64, f64)> {
     let quantizer = scheme.quantizer();
     let sent = || quantizer.centroids().iter().copied().zip(quantizer.probabilities());

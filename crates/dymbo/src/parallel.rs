@@ -97,7 +97,7 @@ impl ParallelFilter {
     }
 
     /// The links' probabilities of loss and of inversion that the filter assumes.
-    pub fn link(&self) -> &Link {
+    pub(crate) fn link(&self) -> &Link {
         &self.link
     }
 

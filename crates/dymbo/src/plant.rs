@@ -69,6 +69,14 @@ impl ScalarPlant {
         Self::of(Ar1::new_unstable(coefficient, process_variance)?, measurement_variance)
     }
 
+    /// Refuses a plant that corrections of bounded size cannot hold.
+    ///
+    /// # Errors
+    /// If `|a| > 1`: an error beyond `gain / (|a| - 1)` then grows for ever, although the computed variance stays finite.
+    pub(crate) fn refuse_unstable(&self) -> Result<(), Error> {
+        Ar1::new(self.coefficient(), self.process_variance()).map(drop)
+    }
+
     fn of(dynamics: Ar1, measurement_variance: f64) -> Result<Self, Error> {
         Ok(Self {
             dynamics,

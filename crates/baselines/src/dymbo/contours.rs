@@ -1,7 +1,7 @@
 //! Contours of the loss against the Kalman filter, as its closed form predicts it and exact; and a bound of the error under losses.
 
-use crate::dymbo::chain::true_loss;
 use fewbits_core::Link;
+use fewbits_dymbo::chain::true_loss;
 use fewbits_dymbo::{Error, ScalarPlant, sign_bit};
 use fewbits_filters::ScalarSteadyState;
 use fewbits_numerics::error::{ArgumentError, finite};
@@ -79,7 +79,7 @@ const CLOSE: f64 = 0.9;
 /// below [`noise_ratio_at_loss`].
 ///
 /// # Errors
-/// As [`noise_ratio_at_loss`] and [`chain::stationary`](crate::dymbo::chain::stationary).
+/// As [`noise_ratio_at_loss`] and [`chain::stationary`](fewbits_dymbo::chain::stationary).
 pub fn noise_ratio_at_true_loss(level: f64, coefficient: f64) -> Result<Option<f64>, Error> {
     let Some(predicted) = noise_ratio_at_loss(level, coefficient)? else {
         return Ok(None);
@@ -93,7 +93,7 @@ pub fn noise_ratio_at_true_loss(level: f64, coefficient: f64) -> Result<Option<f
 /// below [`coefficient_at_loss`].
 ///
 /// # Errors
-/// As [`coefficient_at_loss`] and [`chain::stationary`](crate::dymbo::chain::stationary).
+/// As [`coefficient_at_loss`] and [`chain::stationary`](fewbits_dymbo::chain::stationary).
 pub fn coefficient_at_true_loss(level: f64, noise_ratio: f64) -> Result<Option<f64>, Error> {
     let Some(predicted) = coefficient_at_loss(level, noise_ratio)? else {
         return Ok(None);
@@ -108,8 +108,8 @@ mod tests {
         coefficient_at_loss, coefficient_at_true_loss, crossing, erasure_bound, noise_ratio_at_loss,
         noise_ratio_at_true_loss,
     };
-    use crate::dymbo::chain::true_loss;
     use fewbits_core::Link;
+    use fewbits_dymbo::chain::true_loss;
     use fewbits_dymbo::{Error, ScalarPlant};
 
     #[test]

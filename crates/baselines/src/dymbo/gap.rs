@@ -164,9 +164,8 @@ pub struct SmoothedGap {
 #[cfg(test)]
 mod tests {
     use super::{Twin, exact_filter};
-    use crate::dymbo::chain;
     use fewbits_core::Link;
-    use fewbits_dymbo::{DymboFilter, MultibitFilter, ScalarFilter, ScalarPlant};
+    use fewbits_dymbo::{DymboFilter, MultibitFilter, ScalarFilter, ScalarPlant, chain};
     use fewbits_monte_carlo::{Moments, Stream};
 
     /// Minimum error and excess add up to the chain's error, within 4.5 standard errors over independent runs.

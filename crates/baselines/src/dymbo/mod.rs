@@ -11,11 +11,9 @@
 //! | a filter of its own for sign bits of vector states, one after the other or at once | [`SignFilter`] |
 //! | the steady state of the Kalman filter of a vector | [`steady_state`] |
 //! | the steady error of a scalar fixed-lag smoother | [`scalar_fixed_lag_variance`] |
-//! | the exact error of every scalar filter, without simulation | [`chain`] |
 //! | the published centre of identical sensors over bits | [`centre`] |
 
 pub mod centre;
-pub mod chain;
 pub mod contours;
 pub mod first_message;
 pub mod gap;

@@ -3,7 +3,7 @@
 //! For up to 16 steps all strings are enumerated, each with its exact density on a grid. The mean over the strings of the posterior
 //! variance is the minimum mean squared error given the bits that the Dymbo filter asked for. The mean squared difference between
 //! the Dymbo estimate and the posterior mean is the filter's excess. Their sum is the filter's mean squared error.
-//! [`chain`](crate::dymbo::chain) computes it independently; the two agree to 13 digits.
+//! [`chain`](fewbits_dymbo::chain) computes it independently; the two agree to 13 digits.
 
 use fewbits_core::factor::Levels;
 use fewbits_core::{Cell, Gaussian, Link, Observation, Sign};
@@ -105,8 +105,7 @@ impl Walk {
 #[cfg(test)]
 mod tests {
     use super::first_message_tree;
-    use crate::dymbo::chain;
-    use fewbits_dymbo::ScalarPlant;
+    use fewbits_dymbo::{ScalarPlant, chain};
 
     #[test]
     fn mmse_and_excess_add_up_to_the_chains_error() {

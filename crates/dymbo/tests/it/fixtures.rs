@@ -5,11 +5,11 @@
 
 use fewbits_baselines::dymbo::first_message::{first_message_mse, first_message_value};
 use fewbits_baselines::dymbo::{
-    SignFilter, chain, contours, expected_information, iterated, scalar_fixed_lag_variance, skew_normal, steady_state,
-    tree,
+    SignFilter, contours, expected_information, iterated, scalar_fixed_lag_variance, skew_normal, steady_state, tree,
 };
 use fewbits_core::factor::{Factor, Levels};
 use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
+use fewbits_dymbo::chain;
 use fewbits_dymbo::{
     CountFusion, DymboFilter, MultibitFilter, Multiple, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant,
     filtered_variance,
@@ -309,7 +309,11 @@ fn prop2_entry(entry: &Entry<'_>) -> Vec<f64> {
 fn sensors_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
     let (plant, k) = (entry.plant(), entry.number("K") as usize);
     Some(match entry.id.rsplit('.').next()? {
-        "seq" => vec![chain::sequential_steady_state(&plant, k).unwrap().filtered_variance],
+        "seq" => vec![
+            fewbits_dymbo::steady::sequential_steady_state(&plant, k)
+                .unwrap()
+                .filtered_variance,
+        ],
         "par" => {
             let (mse, riccati) =
                 chain::parallel_mse(&ParallelFilter::new(plant, k, CountFusion::Linear).unwrap()).unwrap();

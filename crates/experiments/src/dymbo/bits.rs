@@ -2,8 +2,8 @@
 
 use super::common::{Plant, plants};
 use crate::prelude::*;
-use fewbits_baselines::dymbo::{chain, iterated};
-use fewbits_dymbo::{MultibitFilter, ScalarFilter};
+use fewbits_baselines::dymbo::iterated;
+use fewbits_dymbo::{MultibitFilter, ScalarFilter, chain};
 
 parameters! {
     pub struct Parameters {

@@ -2,8 +2,8 @@
 
 use super::common::{Plant, each, log_spaced};
 use crate::prelude::*;
-use fewbits_baselines::dymbo::chain;
 use fewbits_baselines::dymbo::contours;
+use fewbits_dymbo::chain;
 
 fn hundredths(i: i32) -> f64 {
     f64::from(i) / 100.0

@@ -2,9 +2,9 @@
 
 use super::common::{Plant, plants};
 use crate::prelude::*;
-use fewbits_baselines::dymbo::chain::{self, MessageLaw};
 use fewbits_baselines::dymbo::gap::{Twin, exact_filter};
 use fewbits_baselines::dymbo::tree;
+use fewbits_dymbo::chain::{self, MessageLaw};
 use fewbits_dymbo::{DymboFilter, MultibitFilter, ScalarFilter, innovation_gain};
 
 parameters! {

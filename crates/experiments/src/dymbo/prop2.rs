@@ -1,8 +1,8 @@
 //! The fine first message: what it brings, and the variance to start from.
 
 use crate::prelude::*;
-use fewbits_baselines::dymbo::chain::first_message_transient;
 use fewbits_baselines::dymbo::first_message::first_message_mse;
+use fewbits_dymbo::chain::first_message_transient;
 use fewbits_dymbo::{RoundedSample, ScalarPlant};
 
 parameters! {

@@ -3,11 +3,12 @@
 use super::{assert_agrees, assert_agrees_if_known, exact, trials};
 use fewbits_baselines::dymbo::first_message::first_message_value;
 use fewbits_baselines::dymbo::gap::{SmoothedGap, Twin, exact_filter};
-use fewbits_baselines::dymbo::{SignFilter, chain, contours, scalar_fixed_lag_variance, steady_state};
+use fewbits_baselines::dymbo::{SignFilter, contours, scalar_fixed_lag_variance, steady_state};
 use fewbits_core::factor::Levels;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Observed, Sensing, Sign};
 use fewbits_dymbo::{
-    CountFusion, DymboFilter, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant, filtered_variance,
+    CountFusion, DymboFilter, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant, chain, filtered_variance,
+    steady,
 };
 use fewbits_experiments::Measured;
 use fewbits_filters::{GaussianCloud, RaoBlackwellised, ResamplingRule, StateFilter};
@@ -184,7 +185,7 @@ fn two_sensors_in_turn_are_worth_one_unquantized() {
         .flat_map(|gamma| [1, 2, 3, 5, 10, 20].map(|k| (gamma, k)))
     {
         let plant = plant(gamma);
-        let sequential = chain::sequential_steady_state(&plant, sensors)
+        let sequential = steady::sequential_steady_state(&plant, sensors)
             .unwrap()
             .filtered_variance;
         let fused = |fusion| chain::parallel_mse(&ParallelFilter::new(plant, sensors, fusion).unwrap()).unwrap();
@@ -207,7 +208,7 @@ fn two_sensors_in_turn_are_worth_one_unquantized() {
     }
     let one = plant(0.5).steady_state(1.0).unwrap().filtered_variance;
     assert!(
-        chain::sequential_steady_state(&plant(0.5), 2)
+        steady::sequential_steady_state(&plant(0.5), 2)
             .unwrap()
             .filtered_variance
             < one

@@ -1,8 +1,8 @@
 //! Mean squared error, slot by slot, from the first message on.
 
 use super::{ErrorChain, MessageLaw};
+use crate::{DymboFilter, Error, ScalarPlant};
 use fewbits_core::Link;
-use fewbits_dymbo::{DymboFilter, Error, ScalarPlant};
 use fewbits_numerics::error::non_negative;
 use std::f64::consts::FRAC_2_PI;
 
@@ -40,8 +40,7 @@ pub fn first_message_transient(
     }];
     for _ in 0..steps {
         let predicted_variance = plant.dynamics().predict_variance(filtered_variance);
-        filtered_variance =
-            fewbits_dymbo::filtered_variance(predicted_variance, plant.measurement_variance(), FRAC_2_PI);
+        filtered_variance = crate::filtered_variance(predicted_variance, plant.measurement_variance(), FRAC_2_PI);
         let law = MessageLaw::bit(&filter, predicted_variance, &Link::PERFECT)?;
         transient.push(TransientStep {
             predicted_variance,

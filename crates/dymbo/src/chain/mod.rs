@@ -1,4 +1,4 @@
-//! The exact mean squared error of every scalar filter of `fewbits-dymbo`, without Monte Carlo.
+//! The exact mean squared error of every scalar filter of this crate, without Monte Carlo.
 //!
 //! The threshold is the prediction, so the probability of a message depends on the state only through the prediction error
 //! `e = theta - prediction`. This error is therefore a Markov chain by itself:
@@ -13,8 +13,7 @@
 //! shift by `d_j` enters as the mean of the normal kernel, so nothing is interpolated.
 //!
 //! ```
-//! use fewbits_baselines::dymbo::chain;
-//! use fewbits_dymbo::{DymboFilter, ScalarPlant};
+//! use fewbits_dymbo::{chain, DymboFilter, ScalarPlant};
 //! let plant = ScalarPlant::new(0.9, 0.5, 1.0)?;
 //! let exact = chain::dymbo_mse(&DymboFilter::new(plant))?;
 //! assert!((exact - 0.729_565_800_136).abs() < 1e-10);
@@ -22,18 +21,16 @@
 //! ```
 
 mod law;
-mod several;
 mod stationary;
 mod transient;
 
 pub use law::MessageLaw;
-pub use several::sequential_steady_state;
 pub use stationary::{
     StationaryError, crossover_mse, dymbo_mse, multibit_mse, parallel_mse, sequential_mse, stationary, true_loss,
 };
 pub use transient::{TransientStep, first_message_transient};
 
-use fewbits_dymbo::{Error, ScalarPlant};
+use crate::{Error, ScalarPlant};
 use fewbits_filters::UniformGrid;
 use fewbits_numerics::error::{ArgumentError, positive};
 use fewbits_numerics::normal::{self, INV_SQRT_2PI};

@@ -1,11 +1,10 @@
 //! Probability of each message as a function of the prediction error, and the filter's correction for it.
 
+use crate::plant::{filtered_variance, innovation_gain, scalar};
+use crate::sign_bit::SignBit;
+use crate::{CellIndex, DymboFilter, Error, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant};
 use fewbits_core::factor::{Factor, Product};
-use fewbits_core::{Gaussian, Link, Observation, Quantized, Scheme, Sign};
-use fewbits_dymbo::{
-    CellIndex, DymboFilter, Error, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant, SignBit,
-    filtered_variance, innovation_gain,
-};
+use fewbits_core::{Link, Observation, Scheme, Sign};
 use fewbits_numerics::binomial::log_row;
 use fewbits_numerics::error::within;
 use fewbits_numerics::normal::SQRT_2_OVER_PI;
@@ -31,7 +30,7 @@ impl MessageLaw {
     /// # Errors
     /// If the correction is not finite.
     pub fn bit(filter: &DymboFilter, predicted_variance: f64, actual: &Link) -> Result<Self, Error> {
-        let predicted = Gaussian::scalar(0.0, predicted_variance)?;
+        let predicted = scalar(0.0, predicted_variance);
         Self::of(filter, &predicted, &BITS, actual)
     }
 
@@ -40,14 +39,14 @@ impl MessageLaw {
     /// # Errors
     /// If the correction is not finite.
     pub fn word(filter: &MultibitFilter, predicted_variance: f64) -> Result<Self, Error> {
-        let words: Vec<CellIndex> = (0..1 << filter.scheme().word_bits()).map(CellIndex).collect();
-        Self::of(filter, &Gaussian::scalar(0.0, predicted_variance)?, &words, filter.link())
+        let words: Vec<CellIndex> = (0..filter.levels().len() as u16).map(CellIndex).collect();
+        Self::of(filter, &scalar(0.0, predicted_variance), &words, filter.link())
     }
 
     /// The law of one report: one entry for each of `reports`, which are all that can be received.
     fn of<F: ScalarFilter>(
         filter: &F,
-        predicted: &Gaussian<1>,
+        predicted: &fewbits_core::Gaussian<1>,
         reports: &[<F::Scheme as Scheme<1>>::Report],
         actual: &Link,
     ) -> Result<Self, Error>
@@ -70,9 +69,9 @@ impl MessageLaw {
     ///
     /// # Errors
     /// Never for a filter that its constructors made.
-    pub(super) fn count(filter: &ParallelFilter, predicted_variance: f64) -> Result<Self, Error> {
+    pub(crate) fn count(filter: &ParallelFilter, predicted_variance: f64) -> Result<Self, Error> {
         let (sensors, arriving) = (filter.sensors(), Link::flipping(filter.link().crossover())?);
-        let scheme = SignBit::new(filter.plant().measurement_variance())?;
+        let scheme = SignBit::of(filter.plant());
         let factor = |bit: Sign| scheme.factor(&0.0, &Observation::Received(bit), &arriving);
         let (above, below) = (factor(Sign::Above)?, factor(Sign::Below)?);
         let mut law = Self::empty();
@@ -89,9 +88,9 @@ impl MessageLaw {
     ///
     /// # Errors
     /// If `sensors` is zero or above 12: the number of bit strings doubles with each sensor.
-    pub(super) fn sequence(plant: &ScalarPlant, predicted_variance: f64, sensors: usize) -> Result<Self, Error> {
+    pub(crate) fn sequence(plant: &ScalarPlant, predicted_variance: f64, sensors: usize) -> Result<Self, Error> {
         within("sensors", sensors as f64, 1.0, MAX_SEQUENCE as f64)?;
-        let (scheme, r) = (SignBit::new(plant.measurement_variance())?, plant.measurement_variance());
+        let (scheme, r) = (SignBit::of(plant), plant.measurement_variance());
         let mut law = Self::empty();
         (law.corrections, law.factors) = (vec![0.0], vec![(0.0, Product::default())]);
         let mut p = predicted_variance;
@@ -121,12 +120,12 @@ impl MessageLaw {
     }
 
     /// The filter's correction for each message, in state units.
-    pub(super) fn corrections(&self) -> &[f64] {
+    pub(crate) fn corrections(&self) -> &[f64] {
         &self.corrections
     }
 
     /// Probability and correction of every message when the prediction error is `error`.
-    pub(super) fn messages(&self, error: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
+    pub(crate) fn messages(&self, error: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
         let probability = move |(log, factor): &(f64, Product)| (log + factor.log_likelihood(&[error].into())).exp();
         self.factors
             .iter()
@@ -138,10 +137,9 @@ impl MessageLaw {
 #[cfg(test)]
 mod tests {
     use super::MessageLaw;
+    use crate::{CountFusion, DymboFilter, MultibitFilter, ParallelFilter, ScalarPlant};
     use fewbits_core::Link;
-    use fewbits_dymbo::{CountFusion, DymboFilter, MultibitFilter, ParallelFilter, ScalarPlant};
     use fewbits_numerics::normal::{cdf, interval};
-    use fewbits_quantizers::lloyd_max::gaussian_table;
 
     fn plant() -> ScalarPlant {
         ScalarPlant::new(0.9, 0.5, 1.0).unwrap()
@@ -184,7 +182,7 @@ mod tests {
             let bit = MessageLaw::bit(&DymboFilter::new(plant()), 1.1, &Link::flipping(0.2).unwrap()).unwrap();
             close(&probabilities(&bit, e), &[0.2 + 0.6 * cdf(-e), 0.2 + 0.6 * cdf(e)]);
             let words = MultibitFilter::new(plant(), 2).unwrap();
-            let edge = 2.1_f64.sqrt() * gaussian_table(2).unwrap().breakpoints()[2];
+            let edge = 2.1_f64.sqrt() * crate::ScalarFilter::scheme(&words).quantizer().breakpoints()[2];
             let inner = [interval(-edge - e, -e), interval(-e, edge - e)];
             let expected = [cdf(-edge - e), inner[0], inner[1], cdf(e - edge)];
             close(&probabilities(&MessageLaw::word(&words, 1.1).unwrap(), e), &expected);

@@ -1,9 +1,8 @@
 //! The stationary prediction error: mean squared errors and kurtosis after many slots.
 
-use super::several::{refuse_unstable, sequential_steady_state, settle};
 use super::{ErrorChain, MessageLaw};
+use crate::{DymboFilter, Error, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant, steady};
 use fewbits_core::Link;
-use fewbits_dymbo::{DymboFilter, Error, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant};
 use std::f64::consts::FRAC_2_PI;
 
 /// Moments of the stationary error.
@@ -23,7 +22,7 @@ pub struct StationaryError {
 /// # Errors
 /// If `|a| > 1` (no stationary law exists) or the process noise is zero; [`Error::NotConverged`] if the iteration does not converge.
 pub fn stationary(plant: &ScalarPlant, law: &MessageLaw) -> Result<StationaryError, Error> {
-    refuse_unstable(plant)?;
+    plant.refuse_unstable()?;
     let largest = law.corrections().iter().fold(0.0, |m: f64, d| m.max(d.abs()));
     // A rough normal start; the width follows the density if this guess is too small.
     let mut guess = plant.steady_state(FRAC_2_PI)?.filtered_variance.max(largest * largest);
@@ -74,7 +73,7 @@ pub fn multibit_mse(filter: &MultibitFilter) -> Result<f64, Error> {
 /// # Errors
 /// As [`stationary`].
 pub fn parallel_mse(filter: &ParallelFilter) -> Result<(f64, f64), Error> {
-    let settled = settle(filter.plant(), filter.link(), |p| filter.table(p).1)?;
+    let settled = steady::settle(filter.plant(), filter.link(), |p| filter.table(p).1)?;
     let law = MessageLaw::count(filter, settled.predicted_variance)?;
     Ok((stationary(filter.plant(), &law)?.filtered_mse, settled.filtered_variance))
 }
@@ -84,7 +83,7 @@ pub fn parallel_mse(filter: &ParallelFilter) -> Result<(f64, f64), Error> {
 /// # Errors
 /// As [`stationary`]; if there are more than 12 sensors.
 pub fn sequential_mse(plant: &ScalarPlant, sensors: usize) -> Result<f64, Error> {
-    let p = sequential_steady_state(plant, sensors)?.predicted_variance;
+    let p = steady::sequential_steady_state(plant, sensors)?.predicted_variance;
     Ok(stationary(plant, &MessageLaw::sequence(plant, p, sensors)?)?.filtered_mse)
 }
 
@@ -99,9 +98,9 @@ pub fn true_loss(plant: &ScalarPlant) -> Result<f64, Error> {
 #[cfg(test)]
 mod tests {
     use super::{crossover_mse, dymbo_mse, multibit_mse, parallel_mse, sequential_mse, stationary};
-    use crate::dymbo::chain::{ErrorChain, MessageLaw};
+    use crate::chain::{ErrorChain, MessageLaw};
+    use crate::{CountFusion, DymboFilter, Error, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant};
     use fewbits_core::Link;
-    use fewbits_dymbo::{CountFusion, DymboFilter, Error, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant};
 
     fn plant() -> ScalarPlant {
         ScalarPlant::new(0.9, 0.5, 1.0).unwrap()

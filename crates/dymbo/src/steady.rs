@@ -1,30 +1,22 @@
 //! Steady-state variances of several sign bits per slot.
 
+use crate::plant::filtered_variance;
+use crate::{Error, ScalarPlant};
 use fewbits_core::Link;
-use fewbits_dymbo::{Error, ScalarPlant, filtered_variance};
 use fewbits_filters::ScalarSteadyState;
-use fewbits_models::Ar1;
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::roots::bracketed;
 use std::f64::consts::FRAC_2_PI;
-
-/// Refuses a plant that corrections of bounded size cannot hold.
-///
-/// # Errors
-/// If `|a| > 1`: an error beyond `gain / (|a| - 1)` then grows for ever, although the computed variance stays finite.
-pub(super) fn refuse_unstable(plant: &ScalarPlant) -> Result<(), Error> {
-    Ar1::new(plant.coefficient(), plant.process_variance()).map(drop)
-}
 
 /// The fixed point of a variance recursion. `slot` maps a predicted variance to the filtered one. It must be increasing and concave, and
 /// remove at least as much variance as one sign bit through the link.
 ///
 /// # Errors
 /// If the plant is unstable, or the recursion has no finite fixed point.
-pub(super) fn settle(plant: &ScalarPlant, link: &Link, slot: impl Fn(f64) -> f64) -> Result<ScalarSteadyState, Error> {
-    refuse_unstable(plant)?;
+pub(crate) fn settle(plant: &ScalarPlant, link: &Link, slot: impl Fn(f64) -> f64) -> Result<ScalarSteadyState, Error> {
+    plant.refuse_unstable()?;
     let one_bit = plant
-        .steady_state(fewbits_dymbo::sign_bit::information(link))?
+        .steady_state(crate::sign_bit::information(link))?
         .predicted_variance;
     let change = |p: f64| p - plant.dynamics().predict_variance(slot(p));
     // The recursion falls from one bit's fixed point to its own, and never below the process noise.
@@ -53,7 +45,7 @@ pub fn sequential_steady_state(plant: &ScalarPlant, sensors: usize) -> Result<Sc
 #[cfg(test)]
 mod tests {
     use super::sequential_steady_state;
-    use fewbits_dymbo::{Error, ScalarPlant};
+    use crate::{Error, ScalarPlant};
 
     #[test]
     fn bits_in_a_row_settle_where_the_recursion_does() {
@@ -71,7 +63,7 @@ mod tests {
         let mut m = 1.0;
         for _ in 0..500 {
             m = (0..5).fold(plant.dynamics().predict_variance(m), |p, _| {
-                fewbits_dymbo::filtered_variance(p, 1.0, std::f64::consts::FRAC_2_PI)
+                crate::filtered_variance(p, 1.0, std::f64::consts::FRAC_2_PI)
             });
         }
         assert!((sequential_steady_state(&plant, 5).unwrap().filtered_variance - m).abs() < 1e-14);
