@@ -26,6 +26,8 @@ pub enum Mistake {
     Flight,
     /// The same for times to an anchor and back.
     RoundTrip,
+    /// Ranges are twice the distance: there and back.
+    Doubled,
     /// The target is at this height, and not at that of the settings.
     Height(f64),
 }
@@ -148,6 +150,7 @@ fn try_tables(
             fit(anchors, &changed, slopes, mistake)
         };
         change(Mistake::Squared, &|range| range.sqrt(), &|range| 0.5 / range.sqrt())?;
+        change(Mistake::Doubled, &|range| 0.5 * range, &|_| 0.5)?;
         change(Mistake::Flight, &|range| LIGHT * range, &|_| LIGHT)?;
         change(Mistake::RoundTrip, &|range| 0.5 * LIGHT * range, &|_| 0.5 * LIGHT)?;
     }

@@ -22,6 +22,7 @@ mod bank;
 mod estimate;
 mod fit;
 mod gaussian;
+mod grid;
 mod growth;
 mod heights;
 mod late;

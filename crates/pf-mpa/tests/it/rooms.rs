@@ -540,6 +540,7 @@ fn mistakes_of_tables_are_found() {
     turned[1].1 = Vector3::new(1.0, 14.0, 0.0);
     assert_eq!(found(&turned, &as_they_are, &mut noise), Some(Mistake::Axes("h1".to_owned())));
     assert_eq!(found(&anchors, &|_, range| range * range, &mut noise), Some(Mistake::Squared));
+    assert_eq!(found(&anchors, &|_, range| 2.0 * range, &mut noise), Some(Mistake::Doubled));
     assert_eq!(found(&anchors, &|_, range| range / 0.149_896_229, &mut noise), Some(Mistake::RoundTrip));
 }
 
