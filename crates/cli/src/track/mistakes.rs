@@ -65,6 +65,12 @@ pub(super) fn mended(mistake: &Mistake) -> Option<String> {
             let height = short(*height);
             format!("the target were at the height {height}: --height {height} says so")
         }
+        Mistake::HeightChanges { mean, deviation } => {
+            let (mean, deviation) = (short(*mean), short(*deviation));
+            format!(
+                "the height of the target changed, about {mean} by {deviation}: it is supposed to be constant, so places are wrong and bands too narrow"
+            )
+        }
         Mistake::Swapped(one, other) => {
             format!("anchors {one} and {other} had each other's place: exchange their names in the table of anchors")
         }
@@ -72,6 +78,10 @@ pub(super) fn mended(mistake: &Mistake) -> Option<String> {
             format!("x and y of anchor {anchor} stood for each other: exchange them in the table of anchors")
         }
         Mistake::Squared => "they were squares of distances: give the roots".to_owned(),
+        Mistake::Unit(factor) => {
+            let factor = short(*factor);
+            format!("they were of another unit than the places: multiply them by {factor}")
+        }
         Mistake::Doubled => {
             "they were twice the distances, the way there and back: multiply them by 0.5".to_owned()
         }

@@ -1,6 +1,6 @@
 //! Tracking of a position by distances to anchors.
 
-use super::anchors::Anchor;
+use super::anchors::{Anchor, together};
 use super::divisor::common_divisor;
 use super::instant::Instant;
 use super::mistakes::{FIRST_RANGES, limited, mended, mistake, proportion};
@@ -109,6 +109,7 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
     let mut settings = settings(options)?;
     let mut hints = instants.roles.told.clone();
     let strengths = Strengths::of(options)?;
+    hints.extend(together(anchors));
     hints.extend(take_told(options, anchors, &mut settings, &mut instants)?);
     let mut tracker = RangeTracker::new(anchors.iter().cloned(), travel, settings).map_err(refused)?;
     let known = |name: &str| anchors.iter().position(|(known, _)| known == name);
@@ -335,7 +336,7 @@ fn lines(summary: &Summary, tracker: &RangeTracker, settings: RangeSettings, lea
     }
     lines.extend(summary.hints.iter().cloned());
     // A wrong height lengthens the ranges of the nearest anchors, and their errors last.
-    let is_height = matches!(summary.mistake, Some(Mistake::Height(_)));
+    let is_height = matches!(summary.mistake, Some(Mistake::Height(_) | Mistake::HeightChanges { .. }));
     for anchor in &summary.anchors {
         if anchor.ranges == 0 && !has_ranges {
             continue;

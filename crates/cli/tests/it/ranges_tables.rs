@@ -159,6 +159,18 @@ fn left_out(word: &str, count: &str) {
     assert_eq!(summary[count], written, "{summary}");
 }
 
+/// A line of the table of anchors that is copied and not changed.
+#[test]
+fn anchors_at_one_place_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let places = [RECTANGLE[0], RECTANGLE[1], RECTANGLE[2], RECTANGLE[3], RECTANGLE[3]];
+    anchors(folder.path(), &places, 1.0, false);
+    let input = table(5, 20, |_, i| distance(&places[i], &[4.1, 2.2, 0.0]));
+    let words = ["ranges", "-", "--anchors", "anchors.csv", "--json"];
+    let output = fewbits(folder.path(), &words, input.as_bytes());
+    assert!(text(&output.stderr).contains("n3 and n4 stand at one place"), "{}", text(&output.stderr));
+}
+
 /// Rows of several radios are not always in order.
 #[test]
 fn late_rows_are_taken_in() {

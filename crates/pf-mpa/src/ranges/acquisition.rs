@@ -66,7 +66,7 @@ pub(super) fn hypotheses(
         anchors,
     };
     let least = known.axes + 1;
-    let typical = known.speeds[known.speeds.len() / 2];
+    let typical = known.speeds[known.middle_speed];
     let left = |without: Option<usize>| -> Vec<Collected> {
         collected
             .iter()

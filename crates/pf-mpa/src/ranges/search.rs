@@ -127,7 +127,7 @@ impl Search<'_> {
 
     /// The evidence of a place and biases of single anchors, at the place's noise and a speed in the middle.
     pub(super) fn evidence(&self, one: &Found, ranges: &[Collected], own: Own) -> Option<f64> {
-        let speed = self.known.speeds[self.known.speeds.len() / 2];
+        let speed = self.known.speeds[self.known.middle_speed];
         let rows = Rows::new(ranges, one.noise, speed, own, one.slice);
         let (_, log_evidence) = fit(self, &one.normal.mean, &rows, speed, own)?;
         Some(log_evidence + one.log_share())
