@@ -4,9 +4,6 @@ use crate::numbers::short;
 use fewbits_pf_mpa::{Mistake, RangeSettings, mistake_of, proportion_of};
 use nalgebra::Vector3;
 
-/// What is said of a height that is wrong.
-pub(super) const AT_ANOTHER_HEIGHT: &str = "the target were at the height";
-
 /// Ranges from which a mistake is found.
 pub(super) const FIRST_RANGES: usize = 400;
 
@@ -52,17 +49,27 @@ pub(super) fn proportion(
     Some(grows(noise, "as"))
 }
 
-/// What to do about the mistake that explains the first ranges, if there is one.
+/// The mistake that explains the first ranges, if there is one.
 pub(super) fn mistake(
     anchors: &[(String, Vector3<f64>)],
     settings: RangeSettings,
     first: &[(f64, usize, f64)],
-) -> Option<String> {
-    let found = mistake_of(anchors, settings, &named(anchors, first)).ok()??;
-    let what = match found {
+) -> Option<Mistake> {
+    mistake_of(anchors, settings, &named(anchors, first)).ok()?
+}
+
+/// What to do about a mistake.
+pub(super) fn mended(mistake: &Mistake) -> Option<String> {
+    let what = match mistake {
         Mistake::Height(height) => {
-            let height = short(height);
-            format!("{AT_ANOTHER_HEIGHT} {height}: --height {height} says so")
+            let height = short(*height);
+            format!("the target were at the height {height}: --height {height} says so")
+        }
+        Mistake::HeightChanges { mean, deviation } => {
+            let (mean, deviation) = (short(*mean), short(*deviation));
+            format!(
+                "the height of the target changed, about {mean} by {deviation}: it is supposed to be constant, so places are wrong and bands too narrow"
+            )
         }
         Mistake::Swapped(one, other) => {
             format!("anchors {one} and {other} had each other's place: exchange their names in the table of anchors")
@@ -71,6 +78,13 @@ pub(super) fn mistake(
             format!("x and y of anchor {anchor} stood for each other: exchange them in the table of anchors")
         }
         Mistake::Squared => "they were squares of distances: give the roots".to_owned(),
+        Mistake::Unit(factor) => {
+            let factor = short(*factor);
+            format!("they were of another unit than the places: multiply them by {factor}")
+        }
+        Mistake::Doubled => {
+            "they were twice the distances, the way there and back: multiply them by 0.5".to_owned()
+        }
         Mistake::Flight => {
             "they were times of flight in nanoseconds, or feet, and places in metres: multiply them by 0.299792458, or 0.3048"
                 .to_owned()

@@ -1,9 +1,9 @@
 //! Tracking of a position by distances to anchors.
 
-use super::anchors::Anchor;
+use super::anchors::{Anchor, together};
 use super::divisor::common_divisor;
 use super::instant::Instant;
-use super::mistakes::{AT_ANOTHER_HEIGHT, FIRST_RANGES, limited, mistake, proportion};
+use super::mistakes::{FIRST_RANGES, limited, mended, mistake, proportion};
 use super::odometry::Odometry;
 use super::path;
 use super::range_settings::{Strengths, settings};
@@ -19,7 +19,7 @@ use crate::numbers::short;
 use crate::output::{Cell, Shape, Sheet};
 use crate::plot::Thinned;
 use crate::report::Report;
-use fewbits_pf_mpa::{RangeEstimate, RangeSettings, RangeTracker, Travel};
+use fewbits_pf_mpa::{Mistake, RangeEstimate, RangeSettings, RangeTracker, Travel};
 use serde::Serialize;
 
 /// Most ranges longer than the anchors are apart by this factor, or shorter, have another unit.
@@ -44,10 +44,15 @@ struct Summary {
     doubtful: u64,
     /// Number of ranges that were left out because they are negative.
     negative: u64,
+    /// Number of ranges that were left out because they are zero.
+    zero: u64,
     losses: usize,
     anchors: Vec<AnchorSummary>,
     /// What the ranges suggest that no option says.
     hints: Vec<String>,
+    /// The mistake of the tables that explains the ranges.
+    #[serde(skip)]
+    mistake: Option<Mistake>,
 }
 
 #[derive(Serialize)]
@@ -104,6 +109,7 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
     let mut settings = settings(options)?;
     let mut hints = instants.roles.told.clone();
     let strengths = Strengths::of(options)?;
+    hints.extend(together(anchors));
     hints.extend(take_told(options, anchors, &mut settings, &mut instants)?);
     let mut tracker = RangeTracker::new(anchors.iter().cloned(), travel, settings).map_err(refused)?;
     let known = |name: &str| anchors.iter().position(|(known, _)| known == name);
@@ -126,8 +132,10 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
         ambiguous: 0,
         doubtful: 0,
         negative: 0,
+        zero: 0,
         losses: 0,
         hints: Vec::new(),
+        mistake: None,
         anchors: anchors
             .iter()
             .map(|(name, _)| AnchorSummary {
@@ -162,8 +170,12 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
             let Some(anchor) = known(name) else {
                 return Err(unknown(instants.file(), name, file));
             };
+            if range == 0.0 && !options.unknown_clock {
+                summary.zero += 1;
+                continue;
+            }
             let range = strengths.map_or(range, |strengths| strengths.distance(range));
-            if range < 0.0 && !options.unknown_clock || range == 0.0 && settings.proportional {
+            if range < 0.0 && !options.unknown_clock {
                 summary.negative += 1;
                 continue;
             }
@@ -255,7 +267,8 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
     let is_suspect =
         summary.losses > 0 || OFTEN * summary.doubtful > summary.rows || summary.anchors.iter().any(is_wrong);
     if is_suspect {
-        summary.hints.extend(mistake(anchors, settings, &first));
+        summary.mistake = mistake(anchors, settings, &first);
+        summary.hints.extend(summary.mistake.as_ref().and_then(mended));
     }
     let own = rounding / 12.0_f64.sqrt();
     if own > noise && options.anchor_bias.is_none() && !settings.proportional {
@@ -290,6 +303,9 @@ fn lines(summary: &Summary, tracker: &RangeTracker, settings: RangeSettings, lea
     ];
     // Values that are no distances say nothing of anchors.
     let has_ranges = summary.ranges > 0 || summary.negative == 0;
+    if summary.zero > 0 {
+        lines.push(format!("{} ranges of 0 were left out, as radios write it for no range", summary.zero));
+    }
     if summary.searching == summary.rows && has_ranges {
         lines.push(format!("a place needs ranges of {} anchors within {silence} s: a larger --silence, or, if times are no seconds, --time-format with their unit",
             tracker.needed()
@@ -320,7 +336,7 @@ fn lines(summary: &Summary, tracker: &RangeTracker, settings: RangeSettings, lea
     }
     lines.extend(summary.hints.iter().cloned());
     // A wrong height lengthens the ranges of the nearest anchors, and their errors last.
-    let is_height = summary.hints.iter().any(|hint| hint.contains(AT_ANOTHER_HEIGHT));
+    let is_height = matches!(summary.mistake, Some(Mistake::Height(_) | Mistake::HeightChanges { .. }));
     for anchor in &summary.anchors {
         if anchor.ranges == 0 && !has_ranges {
             continue;

@@ -28,6 +28,7 @@ fn first(
             let name = &names[*sensor];
             let is_limit = instant.qualifiers.get(i).is_some_and(|one| one.limit.is_some());
             let is_known = anchors.iter().any(|(known, _)| known == name);
+            let range = range.filter(|range| *range != 0.0 || options.unknown_clock);
             let range = range.map(|range| strengths.map_or(range, |strengths| strengths.distance(range)));
             if let Some(range) = range
                 .filter(|range| range.is_finite() && (*range >= 0.0 || options.unknown_clock) && !is_limit && is_known)

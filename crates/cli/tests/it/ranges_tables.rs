@@ -114,16 +114,23 @@ fn anchors_are_read_by_the_names_of_their_columns() {
     assert!(error.contains("no degrees"), "{error}");
 }
 
-/// Radios write a negative number for no range.
+/// Radios write a negative number, or zero, for no range.
 #[test]
-fn negative_ranges_are_left_out() {
+fn negative_ranges_and_zeros_are_left_out() {
+    left_out("-1", "negative");
+    left_out("0", "zero");
+}
+
+fn left_out(word: &str, count: &str) {
     let folder = tempfile::tempdir().unwrap();
     anchors(folder.path(), &RECTANGLE, 1.0, false);
     let truth = [4.1, 2.2, 0.0];
-    let mut numbers = Numbers(3);
+    let (mut numbers, mut written) = (Numbers(3), 0);
     let input = table(4, 150, |row, i| {
         let range = distance(&RECTANGLE[i], &truth) + 0.04 * numbers.normal();
-        if (3 * row + i) % 7 < 2 { -1.0 } else { range }
+        let is_none = (3 * row + i) % 7 < 2;
+        written += usize::from(is_none);
+        if is_none { word.parse().unwrap() } else { range }
     });
     let words = [
         "ranges",
@@ -149,7 +156,19 @@ fn negative_ranges_are_left_out() {
         rows[149]
     );
     let summary: serde_json::Value = serde_json::from_str(text(&output.stderr).lines().last().unwrap()).unwrap();
-    assert_eq!(summary["negative"], input.matches("-1").count(), "{summary}");
+    assert_eq!(summary[count], written, "{summary}");
+}
+
+/// A line of the table of anchors that is copied and not changed.
+#[test]
+fn anchors_at_one_place_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let places = [RECTANGLE[0], RECTANGLE[1], RECTANGLE[2], RECTANGLE[3], RECTANGLE[3]];
+    anchors(folder.path(), &places, 1.0, false);
+    let input = table(5, 20, |_, i| distance(&places[i], &[4.1, 2.2, 0.0]));
+    let words = ["ranges", "-", "--anchors", "anchors.csv", "--json"];
+    let output = fewbits(folder.path(), &words, input.as_bytes());
+    assert!(text(&output.stderr).contains("n3 and n4 stand at one place"), "{}", text(&output.stderr));
 }
 
 /// Rows of several radios are not always in order.

@@ -15,6 +15,7 @@
 use super::bank::Hypothesis;
 use super::fit::{Calibration, Search};
 use super::gaussian::Normal;
+use super::grid::Grid;
 use super::rows::Collected;
 use super::search::Found;
 use super::settings::Known;
@@ -65,7 +66,7 @@ pub(super) fn hypotheses(
         anchors,
     };
     let least = known.axes + 1;
-    let typical = known.speeds[known.speeds.len() / 2];
+    let typical = known.speeds[known.middle_speed];
     let left = |without: Option<usize>| -> Vec<Collected> {
         collected
             .iter()
@@ -88,6 +89,7 @@ pub(super) fn hypotheses(
     let likely = |one: &Found| one.log_evidence + penalty(one.without) + one.log_share();
     // Fewer ranges than unknowns.
     let is_short = |ranges: usize| ranges < known.axes + 2 && calibration[1].1 > 0.0;
+    let grid = Grid::new(&search, collected);
     let mut found: Vec<Found> = Vec::new();
     let singles = if collected.len() > least {
         0..collected.len()
@@ -96,7 +98,7 @@ pub(super) fn hypotheses(
     };
     for without in std::iter::once(None).chain(singles.map(Some)) {
         let ranges = left(without);
-        for start in search.maxima(&ranges) {
+        for start in grid.maxima(&search.calibration, without) {
             let Some(best) = search.best(&start, &ranges, without, typical) else {
                 continue;
             };
@@ -120,7 +122,7 @@ pub(super) fn hypotheses(
     for one in found {
         let ranges = left(one.without);
         if is_short(ranges.len()) {
-            for (piece, place, log_share) in pieces(&search, &one, &ranges, typical) {
+            for (piece, place, log_share) in pieces(&search, &grid, &one, &ranges, typical) {
                 let is_known = parts.iter().any(|(other, known, _)| {
                     known.without == place.without
                         && other.calibration == piece.calibration
@@ -185,14 +187,19 @@ pub(super) fn hypotheses(
             all.push(hypothesis);
         }
     }
-    all.retain(Hypothesis::is_finite);
     all.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
     all
 }
 
 /// A place cut by the error of scale: what each piece is searched with, the places, and `ln` of the piece's share. A curve may have two places
 /// for one error of scale, or none.
-fn pieces<'a>(search: &Search<'a>, one: &Found, ranges: &[Collected], typical: f64) -> Vec<(Search<'a>, Found, f64)> {
+fn pieces<'a>(
+    search: &Search<'a>,
+    grid: &Grid<'_>,
+    one: &Found,
+    ranges: &[Collected],
+    typical: f64,
+) -> Vec<(Search<'a>, Found, f64)> {
     let [bias, (middle, variance)] = search.calibration;
     let deviation = variance.sqrt();
     let mut found: Vec<(Search<'a>, Found, f64)> = Vec::new();
@@ -203,7 +210,10 @@ fn pieces<'a>(search: &Search<'a>, one: &Found, ranges: &[Collected], typical: f
             ..*search
         };
         let mut own: Vec<Found> = Vec::new();
-        let starts = piece.maxima(ranges).into_iter().map(|start| start.to_vec());
+        let starts = grid
+            .maxima(&piece.calibration, one.without)
+            .into_iter()
+            .map(|start| start.to_vec());
         for start in starts.chain([one.normal.mean.clone()]) {
             if let Some(place) = piece.best(&start, ranges, one.without, typical)
                 && !own.iter().any(|known| is_same(&known.normal, &place.normal))

@@ -171,6 +171,11 @@ impl Hypothesis {
         if self.ranges.is_multiple_of(MIXED) {
             let changes = |a_range: f64| -(f64::from(MIXED) * (-a_range).ln_1p()).exp_m1();
             for noise in 0..noises {
+                if known.has_rest {
+                    // A target that rested may move at any speed.
+                    let pair = [0, known.middle_speed].map(|speed| speed * noises + noise);
+                    self.mix(pair.into_iter(), changes(SPEED_CHANGES), self.negligible);
+                }
                 self.mix((0..speeds).map(|speed| speed * noises + noise), changes(SPEED_CHANGES), self.negligible);
             }
             for speed in 0..speeds {

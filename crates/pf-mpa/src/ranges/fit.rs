@@ -42,8 +42,10 @@ impl Search<'_> {
 
 /// Gauss-Newton steps at most.
 const STEPS: usize = 30;
-/// A step that promises to lower the cost by less than this share is not taken.
-const SETTLED: f64 = 1e-4;
+/// A step that promises to lower the cost by less than this share is the last, and the slopes behind it are those before it.
+const SETTLED: f64 = 1e-2;
+/// No step follows one that lowers the cost by less than this share.
+const STALLED: f64 = 1e-4;
 
 /// `S` coordinates: positions, bias and scale.
 type Vector<const S: usize> = [f64; S];
@@ -76,8 +78,6 @@ impl<const S: usize> Local<S> {
 struct Problem<'a, const S: usize> {
     search: &'a Search<'a>,
     rows: &'a Rows<'a>,
-    /// Variance of each range's error, the bias of its anchor included.
-    variances: Vec<f64>,
     middle: Vector<S>,
     prior: Vector<S>,
 }
@@ -109,7 +109,7 @@ impl<const S: usize> Problem<'_, S> {
             information: [[0.0; S]; S],
             gradient: [0.0; S],
         };
-        for (one, variance) in self.rows.ranges.iter().zip(&self.variances) {
+        for (one, variance) in self.rows.ranges.iter().zip(&self.rows.variances) {
             let (expected, slope) = self.expected(x, one);
             found.add(one.range - expected, &slope, *variance);
         }
@@ -151,8 +151,41 @@ fn solve<const S: usize>(root: &Matrix<S>, right: &Vector<S>) -> Vector<S> {
     x
 }
 
-/// The most probable state near a start, its covariance there, and the evidence, in a slice of the positions if there is one. `None` if the
-/// information is singular.
+/// `ln` of a product of positive numbers. One logarithm of many is cheaper than many.
+fn log_of_product(numbers: impl Iterator<Item = f64>) -> f64 {
+    let (mut sum, mut product) = (0.0, 1.0);
+    for number in numbers {
+        product *= number;
+        if !(1e-100..1e100).contains(&product) {
+            sum += f64::ln(product);
+            product = 1.0;
+        }
+    }
+    sum + product.ln()
+}
+
+/// The inverse of the matrix of this lower triangular root.
+fn inverse<const S: usize>(root: &Matrix<S>) -> Matrix<S> {
+    let mut lower = [[0.0; S]; S];
+    for j in 0..S {
+        lower[j][j] = 1.0 / root[j][j];
+        for i in j + 1..S {
+            let known: f64 = (j..i).map(|k| root[i][k] * lower[k][j]).sum();
+            lower[i][j] = -known / root[i][i];
+        }
+    }
+    let mut found = [[0.0; S]; S];
+    for i in 0..S {
+        for j in 0..=i {
+            found[i][j] = (i..S).map(|k| lower[k][i] * lower[k][j]).sum();
+            found[j][i] = found[i][j];
+        }
+    }
+    found
+}
+
+/// The most probable state near a start, which is a place or a whole state, its covariance there, and the evidence, in a slice of the positions if
+/// there is one. `None` if the information is singular.
 pub(super) fn fit(search: &Search<'_>, start: &[f64], rows: &Rows<'_>, speed: f64, own: Own) -> Option<(Normal, f64)> {
     if search.axes() == 2 {
         fit_of::<4>(search, start, rows, speed, own)
@@ -179,17 +212,16 @@ fn fit_of<const S: usize>(
     let problem = Problem {
         search,
         rows,
-        variances: rows
-            .ranges
-            .iter()
-            .zip(&rows.deviations)
-            .map(|(range, one)| one * one + own.of(range.anchor).powi(2))
-            .collect(),
         middle,
         prior,
     };
     let mut x = middle;
     x[..axes].copy_from_slice(start.get(..axes)?);
+    if let Some(known) = start.get(2 * axes..2 * axes + 2) {
+        for (i, value) in known.iter().enumerate().filter(|(i, _)| prior[axes + i] > 0.0) {
+            x[axes + i] = *value;
+        }
+    }
     let mut local = problem.at(&x);
     let mut factor = root(S, 0.0, |i, j| local.information[i][j])?;
     let mut step = solve(&factor, &local.gradient);
@@ -204,7 +236,7 @@ fn fit_of<const S: usize>(
             (0..S).for_each(|i| next[i] += share * step[i]);
             let found = problem.at(&next);
             if found.cost < local.cost {
-                has_moved = local.cost - found.cost > SETTLED * (1.0 + found.cost);
+                has_moved = local.cost - found.cost > STALLED * (1.0 + found.cost);
                 (x, local) = (next, found);
                 break;
             }
@@ -217,13 +249,14 @@ fn fit_of<const S: usize>(
         }
     }
     // Cost at the minimum of the linearised problem.
-    let cost = local.cost - promise(&step, &local);
-    let mut log_determinant: f64 = problem.variances.iter().map(|variance| variance.ln()).sum();
-    log_determinant += rows.slice.map_or(0.0, |slice| 2.0 * slice.deviation.ln());
-    for i in 0..S {
-        let known = if prior[i] > 0.0 { prior[i] } else { 1.0 };
-        log_determinant += (factor[i][i] * factor[i][i] * known).ln();
+    let promised = promise(&step, &local);
+    let cost = local.cost - promised;
+    if promised < SETTLED * (1.0 + local.cost) {
+        (0..S).for_each(|i| x[i] += step[i]);
     }
+    let gains = (0..S).map(|i| factor[i][i] * factor[i][i] * if prior[i] > 0.0 { prior[i] } else { 1.0 });
+    let of_slice = rows.slice.map(|slice| slice.deviation * slice.deviation);
+    let log_determinant = log_of_product(rows.variances.iter().copied().chain(of_slice).chain(gains));
     let count = (rows.ranges.len() + usize::from(rows.slice.is_some())) as f64;
     let log_evidence = -0.5 * (cost + log_determinant + count * std::f64::consts::TAU.ln());
     let normal = law(&problem, &x, &factor, speed, own);
@@ -235,15 +268,11 @@ fn law<const S: usize>(problem: &Problem<'_, S>, x: &Vector<S>, factor: &Matrix<
     let axes = S - 2;
     let first = 2 * axes + 2;
     let n = first + own.count(problem.search.anchors);
-    let mut inverse = [[0.0; S]; S];
-    for (i, column) in inverse.iter_mut().enumerate() {
-        let mut unit = [0.0; S];
-        unit[i] = f64::from(u8::from(problem.prior[i] > 0.0));
-        *column = solve(factor, &unit);
-        for (x, prior) in column.iter_mut().zip(&problem.prior) {
-            if *prior == 0.0 {
-                *x = 0.0;
-            }
+    let mut inverse = inverse(factor);
+    for i in 0..S {
+        if problem.prior[i] == 0.0 {
+            inverse[i] = [0.0; S];
+            inverse.iter_mut().for_each(|row| row[i] = 0.0);
         }
     }
     // Where a coordinate of the problem is in the state.
@@ -252,7 +281,7 @@ fn law<const S: usize>(problem: &Problem<'_, S>, x: &Vector<S>, factor: &Matrix<
     for i in 0..S {
         mean[place(i)] = x[i];
         for j in 0..S {
-            covariance[place(i) * n + place(j)] = 0.5 * (inverse[i][j] + inverse[j][i]);
+            covariance[place(i) * n + place(j)] = inverse[i][j];
         }
     }
     (axes..2 * axes).for_each(|i| covariance[i * n + i] = speed * speed);
@@ -264,7 +293,7 @@ fn law<const S: usize>(problem: &Problem<'_, S>, x: &Vector<S>, factor: &Matrix<
             .rows
             .ranges
             .iter()
-            .zip(&problem.variances)
+            .zip(&problem.rows.variances)
             .filter(|(one, _)| own.of(one.anchor) > 0.0)
             .map(|(one, variance)| {
                 let (expected, slope) = problem.expected(x, one);

@@ -12,6 +12,8 @@ pub(super) const BETTER: f64 = 10.0;
 /// Where the anchors have heights: number of heights that are tried, from below the lowest anchor to above the highest by this share of the spread.
 const HEIGHTS: usize = 9;
 const BEYOND: f64 = 0.5;
+/// Of so many rows one may be doubtful.
+pub(super) const SELDOM: usize = 20;
 /// Heights that are no neighbours must differ by so many nats: anchors of like heights leave two sides.
 const APART: f64 = 6.0;
 /// Halvings of the step between two heights, about the best one.
@@ -46,17 +48,20 @@ pub fn height_of(
     if told < FEWEST * anchors.len() {
         return Ok(None);
     }
-    let evidence = |height: f64| -> Result<f64, Error> {
+    // `ln` of the density of the ranges, and whether bias and scale contradict what is supposed of them.
+    let evidence = |height: f64| -> Result<(f64, bool), Error> {
         let settings = RangeSettings {
             height: Height::Known(height),
             ..settings
         };
         let mut tracker = RangeTracker::new(anchors.iter().cloned(), Travel::Full, settings)?;
+        let mut doubtful = 0;
         for (time, anchor, range) in ranges {
-            tracker.push(*time, anchor, *range)?;
+            let found = tracker.push(*time, anchor, *range)?;
+            doubtful += usize::from(found.is_some_and(|found| found.is_doubtful));
         }
         let found = tracker.log_evidence().filter(|_| tracker.losses() == 0);
-        Ok(found.unwrap_or(f64::NEG_INFINITY))
+        Ok((found.unwrap_or(f64::NEG_INFINITY), SELDOM * doubtful > ranges.len()))
     };
     let count = anchors.len() as f64;
     let middle = anchors.iter().map(|(_, place)| place).sum::<Vector3<f64>>() / count;
@@ -74,12 +79,18 @@ pub fn height_of(
         let step = (high - low) / (HEIGHTS - 1) as f64;
         (0..HEIGHTS).map(|k| low + step * k as f64).collect()
     };
-    let found: Vec<f64> = tried.iter().map(|height| evidence(*height)).collect::<Result<_, _>>()?;
+    let (found, doubtful): (Vec<f64>, Vec<bool>) = tried
+        .iter()
+        .map(|height| evidence(*height))
+        .collect::<Result<Vec<_>, _>>()?
+        .into_iter()
+        .unzip();
     let Some(best) = (0..found.len()).max_by(|one, other| found[*one].total_cmp(&found[*other])) else {
         return Ok(None);
     };
     let is_told = if is_flat {
-        best > 0 && found[0].is_finite() && found[best] > found[0] + BETTER
+        // Ranges of another unit are explained by a height a little.
+        best > 0 && !doubtful[best] && found[0].is_finite() && found[best] > found[0] + BETTER
     } else {
         let is_beaten = |k: usize| k.abs_diff(best) < 2 || found[k] < found[best] - APART;
         best > 0 && best + 1 < found.len() && (0..found.len()).all(is_beaten)
@@ -92,7 +103,7 @@ pub fn height_of(
     for _ in 0..HALVINGS {
         step *= 0.5;
         for other in [height - step, height + step] {
-            let found = evidence(other)?;
+            let (found, _) = evidence(other)?;
             if found > most {
                 (height, most) = (other, found);
             }

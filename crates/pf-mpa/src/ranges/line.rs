@@ -6,12 +6,17 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 /// Anchors are nearly on a line if their deviation across it is less than this share of that along it.
 const FLAT: f64 = 0.4;
 
+/// Anchors are on it if this share is less.
+const EXACT: f64 = 1e-6;
+
 /// A line in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Line {
     middle: Vector2<f64>,
     /// Across the line.
     pub(super) normal: Vector2<f64>,
+    /// Whether the anchors are on it: ranges say nothing of the side.
+    pub(super) is_exact: bool,
 }
 
 impl Line {
@@ -28,6 +33,7 @@ impl Line {
         is_flat.then(|| Self {
             middle,
             normal: eigen.eigenvectors.column(across).into_owned(),
+            is_exact: eigen.eigenvalues[across] < EXACT * EXACT * eigen.eigenvalues[1 - across],
         })
     }
 

@@ -15,18 +15,25 @@ const CROSSED: f64 = 0.02;
 /// Hypotheses of less than this share have no mirror image.
 const PROBABLE: f64 = 0.02;
 
-/// Adds the mirror images of probable places near the line, unless a hypothesis of the same kind is there.
-pub(super) fn add_mirrored(known: &Known, hypotheses: &mut Vec<Hypothesis>) {
+/// Adds the mirror images of probable places near the line, unless a hypothesis of the same kind is there. Of anchors on a line, ranges alone never
+/// tell the side: wherever the place is, its image is as probable. `is_carried`: odometry moves the places.
+pub(super) fn add_mirrored(known: &Known, hypotheses: &mut Vec<Hypothesis>, is_carried: bool) {
     let Some(line) = known.line.filter(|_| known.axes == 2) else {
         return;
     };
     let mut added: Vec<Hypothesis> = Vec::new();
     let shares = shares_of(hypotheses);
-    for (one, _) in hypotheses.iter().zip(shares).filter(|(_, share)| *share > PROBABLE) {
+    let is_blind = line.is_exact && !is_carried;
+    let mut halved = Vec::new();
+    for (number, one) in hypotheses
+        .iter()
+        .enumerate()
+        .filter(|(number, _)| shares[*number] > PROBABLE)
+    {
         let (mean, covariance) = one.marginal(&[0, 1]);
         let covariance = Matrix2::from_fn(|a, b| covariance[a][b]);
         let (off, variance) = (line.offset(&mean), line.normal.dot(&(covariance * line.normal)));
-        if off * off > NEAR * NEAR * variance {
+        if !is_blind && off * off > NEAR * NEAR * variance {
             continue;
         }
         let image = Vector2::from(mean) - 2.0 * off * line.normal;
@@ -39,11 +46,19 @@ pub(super) fn add_mirrored(known: &Known, hypotheses: &mut Vec<Hypothesis>) {
             continue;
         }
         let mut mirrored = one.clone();
-        mirrored.log_weight += CROSSED.ln();
+        if is_blind {
+            mirrored.log_weight += 0.5_f64.ln();
+            halved.push(number);
+        } else {
+            mirrored.log_weight += CROSSED.ln();
+        }
         for i in &mirrored.alive {
             line.mirror(&mut mirrored.filters[*i]);
         }
         added.push(mirrored);
     }
+    halved
+        .into_iter()
+        .for_each(|number| hypotheses[number].log_weight += 0.5_f64.ln());
     hypotheses.append(&mut added);
 }

@@ -1,16 +1,17 @@
 //! Mistakes of tables that explain ranges which contradict each other.
 
-use super::heights::{self, RANGES, height_of};
+use super::heights::{self, RANGES, SELDOM, height_of};
 use super::{Height, RangeSettings, RangeTracker, Travel};
 use crate::Error;
 use nalgebra::Vector3;
 
 /// A mistake must explain the ranges better than other mistakes, and than the tables as they are, by so many nats.
 const BETTER: f64 = 30.0;
-/// Of so many rows one may be doubtful.
-const SELDOM: usize = 20;
 /// Metres that light goes in a nanosecond.
 const LIGHT: f64 = 0.299_792_458;
+/// Factors that bring ranges to the unit of the places: of kilometres, centimetres, millimetres and metres, metres and feet, halves of distances, and
+/// microseconds of flight, there or there and back.
+const UNITS: [f64; 8] = [1e-3, 1e-2, 1e2, 1e3, 1.0 / 0.3048, 2.0, 1e3 * LIGHT, 500.0 * LIGHT];
 
 /// What may be wrong with a table of ranges or of anchors.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,8 +27,19 @@ pub enum Mistake {
     Flight,
     /// The same for times to an anchor and back.
     RoundTrip,
+    /// Ranges are of another unit than places: times this factor they are of the same.
+    Unit(f64),
+    /// Ranges are twice the distance: there and back.
+    Doubled,
     /// The target is at this height, and not at that of the settings.
     Height(f64),
+    /// The height of the target changes.
+    HeightChanges {
+        /// Mean of the estimates.
+        mean: f64,
+        /// Twice their standard deviation.
+        deviation: f64,
+    },
 }
 
 /// What one tracker says of some ranges.
@@ -36,6 +48,8 @@ struct Trial {
     log_evidence: Option<f64>,
     /// Whether few rows are doubtful, no anchor contradicts the others, none has a bias of its own, and no residuals last.
     fits: bool,
+    /// Mean and standard deviation of the heights.
+    heights: (f64, f64),
 }
 
 fn trial(
@@ -44,16 +58,21 @@ fn trial(
     ranges: &[(f64, &str, f64)],
 ) -> Result<Trial, Error> {
     let mut tracker = RangeTracker::new(anchors.iter().cloned(), Travel::Full, settings)?;
-    let mut doubtful = 0;
+    let (mut doubtful, mut count, mut sum, mut squares) = (0, 0.0, 0.0, 0.0);
     for (time, anchor, range) in ranges {
         let found = tracker.push(*time, anchor, *range)?;
         if found.as_ref().is_some_and(|found| found.lost) {
             return Ok(Trial {
                 log_evidence: None,
                 fits: false,
+                heights: (0.0, 0.0),
             });
         }
-        doubtful += usize::from(found.is_some_and(|found| found.is_doubtful));
+        if let Some(found) = found {
+            let z = found.position.z;
+            (count, sum, squares) = (count + 1.0, sum + z, squares + z * z);
+            doubtful += usize::from(found.is_doubtful);
+        }
     }
     let mut fits = SELDOM * doubtful <= ranges.len();
     for (name, _) in anchors {
@@ -63,6 +82,7 @@ fn trial(
     Ok(Trial {
         log_evidence: tracker.log_evidence(),
         fits,
+        heights: (sum / count, (squares / count - (sum / count).powi(2)).max(0.0).sqrt()),
     })
 }
 
@@ -91,6 +111,17 @@ pub fn mistake_of(
         let found = trial(anchors, at, ranges)?;
         let log_evidence = found.log_evidence.filter(|_| found.fits);
         tried.extend(log_evidence.map(|found| (found, Mistake::Height(height))));
+    }
+    let is_flat = anchors.iter().all(|(_, place)| place.z == anchors[0].1.z);
+    if !as_it_is.fits && !is_flat && !settings.unknown_clock && matches!(settings.height, Height::Known(_)) {
+        let found = trial(anchors, unsaid, ranges)?;
+        let (mean, spread) = found.heights;
+        let mistake = Mistake::HeightChanges {
+            mean,
+            deviation: 2.0 * spread,
+        };
+        let log_evidence = found.log_evidence.filter(|_| found.fits && spread > 0.0);
+        tried.extend(log_evidence.map(|found| (found, mistake)));
     }
     // Few ranges of a wrong height fit, but less well.
     if !as_it_is.fits {
@@ -148,6 +179,10 @@ fn try_tables(
             fit(anchors, &changed, slopes, mistake)
         };
         change(Mistake::Squared, &|range| range.sqrt(), &|range| 0.5 / range.sqrt())?;
+        for factor in UNITS {
+            change(Mistake::Unit(factor), &|range| factor * range, &|_| factor)?;
+        }
+        change(Mistake::Doubled, &|range| 0.5 * range, &|_| 0.5)?;
         change(Mistake::Flight, &|range| LIGHT * range, &|_| LIGHT)?;
         change(Mistake::RoundTrip, &|range| 0.5 * LIGHT * range, &|_| 0.5 * LIGHT)?;
     }

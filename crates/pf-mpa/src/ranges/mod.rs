@@ -22,6 +22,7 @@ mod bank;
 mod estimate;
 mod fit;
 mod gaussian;
+mod grid;
 mod growth;
 mod heights;
 mod late;
@@ -382,7 +383,8 @@ impl RangeTracker {
         let taken = drop_improbable(next, known.negligible);
         if self.pushed.is_multiple_of(COMPARED) {
             merge_same(next, known.axes);
-            add_mirrored(known, next);
+            let is_carried = self.collected.values().any(|latest| latest.moved != [0.0; 3]);
+            add_mirrored(known, next, is_carried);
         }
         Ok((taken, residual))
     }

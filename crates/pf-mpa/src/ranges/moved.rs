@@ -40,6 +40,12 @@ impl RangeTracker {
             }
             (self.hypotheses, self.at) = (next, time);
         }
+        if self.known.has_rest && whole != [0.0; 3] {
+            // What odometry leaves open lasts: it is no rest.
+            let noises = self.known.noises.len();
+            self.hypotheses.iter_mut().for_each(|one| one.leave_rest_out(noises));
+            self.known.leave_rest_out();
+        }
         for latest in self.collected.values_mut() {
             latest.moved.iter_mut().zip(&whole).for_each(|(sum, x)| *sum += x);
         }
@@ -48,6 +54,19 @@ impl RangeTracker {
 }
 
 impl Hypothesis {
+    /// Gives the weights of the slowest speed's filters to those of the next one.
+    fn leave_rest_out(&mut self, noises: usize) {
+        for i in 0..noises {
+            if self.weights[noises + i] == 0.0 {
+                self.filters.swap(i, noises + i);
+            }
+            self.weights[noises + i] += self.weights[i];
+        }
+        self.filters.drain(..noises);
+        self.weights.drain(..noises);
+        self.alive = (0..self.weights.len()).filter(|i| self.weights[*i] > 0.0).collect();
+    }
+
     /// Whether the error of scale is not to be estimated: from one place, ranges to anchors with biases of their own, or from an unknown clock, do
     /// not tell it from these, and a filter that linearises them again and again would believe that they do. `is_short`: the anchors without biases
     /// of their own are fewer than position, bias and error of scale have coordinates.
@@ -60,7 +79,7 @@ impl Hypothesis {
             return false;
         };
         let state = &self.filters[heaviest];
-        let is_slowest = heaviest < known.noises.len();
+        let is_slowest = heaviest < known.noises.len() * (1 + usize::from(known.has_rest));
         let has_own = state.mean.len() > 2 * state.axes + 2;
         // One anchor's own bias is told from the rest at one place if the others are enough.
         let is_blind = known.clock.is_some() || has_own && (state.only.is_none() || is_short);

@@ -1,6 +1,7 @@
 //! Ranges that a place must explain.
 
 use super::measured::Measured;
+use super::settings::Own;
 
 /// The latest range of an anchor.
 #[derive(Debug, Clone, Copy)]
@@ -55,20 +56,20 @@ pub(super) struct Slice {
     pub(super) deviation: f64,
 }
 
-/// Ranges with their errors' deviations.
+/// Ranges with their errors' variances, the biases of their anchors included.
 pub(super) struct Rows<'a> {
     pub(super) ranges: &'a [Collected],
-    pub(super) deviations: Vec<f64>,
+    pub(super) variances: Vec<f64>,
     pub(super) slice: Option<Slice>,
 }
 
 impl<'a> Rows<'a> {
-    pub(super) fn new(ranges: &'a [Collected], noise: f64, speed: f64, slice: Option<Slice>) -> Self {
+    pub(super) fn new(ranges: &'a [Collected], noise: f64, speed: f64, own: Own, slice: Option<Slice>) -> Self {
         Self {
             ranges,
-            deviations: ranges
+            variances: ranges
                 .iter()
-                .map(|one| noise.hypot(speed * one.age * one.slope))
+                .map(|one| noise * noise + (speed * one.age * one.slope).powi(2) + own.of(one.anchor).powi(2))
                 .collect(),
             slice,
         }

@@ -14,6 +14,8 @@ mod shares {
     /// Velocity per second, and the factor to either side.
     pub(super) const SPEED: f64 = 0.08;
     pub(super) const SPEEDS: f64 = 10.0;
+    /// The same of a target that rests.
+    pub(super) const REST: f64 = 0.0003;
     pub(super) const BIAS: f64 = 0.2;
     pub(super) const ANCHOR_BIAS: f64 = 0.03;
     /// Probability that an anchor has a bias of its own of the size of the common one.
@@ -74,7 +76,8 @@ pub struct RangeSettings {
     pub stray: Option<f64>,
     /// Standard deviation of the velocity along each axis, per second. Default: 0.08 spreads.
     pub speed: Option<f64>,
-    /// The tracker estimates the speed from `speed / speed_factor` to `speed * speed_factor`. Default: 4, or 10 if `speed` is not stated.
+    /// The tracker estimates the speed from `speed / speed_factor` to `speed * speed_factor`. Default: 4, or 10 if `speed` is not stated, and then
+    /// the target may rest too: 0.0003 spreads per second.
     pub speed_factor: Option<f64>,
     /// Correlation time of the velocity, in seconds.
     pub persistence: f64,
@@ -181,6 +184,9 @@ pub(super) struct Known {
     /// Deviations of the bank, and the steps between them as lists.
     pub(super) noises: Vec<f64>,
     pub(super) speeds: Vec<f64>,
+    /// One in the middle, and whether the first is that of a target that rests.
+    pub(super) middle_speed: usize,
+    pub(super) has_rest: bool,
     pub(super) log_noises: Vec<f64>,
     pub(super) log_speeds: Vec<f64>,
     pub(super) outliers: f64,
@@ -197,6 +203,18 @@ pub(super) struct Known {
     pub(super) negligible: f64,
     /// Deviation of the clock, if it is unknown.
     pub(super) clock: Option<f64>,
+}
+
+impl Known {
+    /// Leaves out that the target rests.
+    pub(super) fn leave_rest_out(&mut self) {
+        if self.has_rest {
+            self.has_rest = false;
+            self.middle_speed -= 1;
+            self.speeds.remove(0);
+            self.log_speeds.remove(0);
+        }
+    }
 }
 
 impl RangeSettings {
@@ -299,7 +317,12 @@ impl RangeSettings {
         };
         let spacing = if self.speed.is_some() { 2.0 } else { 2.5 };
         let noises = steps(noise / noise_factor, noise, 2.0);
-        let speeds = steps(speed / speed_factor, speed * speed_factor, spacing);
+        let mut speeds = steps(speed / speed_factor, speed * speed_factor, spacing);
+        let has_rest = self.speed.is_none() && self.speed_factor.is_none();
+        let middle_speed = speeds.len() / 2 + usize::from(has_rest);
+        if has_rest {
+            speeds.insert(0, shares::REST * spread);
+        }
         Ok(Known {
             axes,
             level,
@@ -313,6 +336,8 @@ impl RangeSettings {
             log_speeds: speeds.iter().map(|one| one.ln()).collect(),
             noises,
             speeds,
+            middle_speed,
+            has_rest,
             outliers: self.outliers,
             stray,
             persistence: self.persistence,

@@ -511,6 +511,95 @@ fn anchors_in_an_absurd_unit_are_refused_for_their_unit() {
     assert!([1e12, 1e-9].into_iter().all(|unit| refusal(unit).is_ok()));
 }
 
+/// Rows, coordinates held, the longest time wrong and the last error of a target whose ranges have this bias, scale and noise.
+fn followed(
+    places: &[[f64; 2]],
+    truth: &[[f64; 2]],
+    (bias, scale, noise): (f64, f64, f64),
+    seed: u64,
+) -> (usize, usize, usize, f64) {
+    let place = |(i, [x, y]): (usize, &[f64; 2])| (format!("p{i}"), Vector3::new(*x, *y, 0.0));
+    let anchors: Vec<(String, Vector3<f64>)> = places.iter().enumerate().map(place).collect();
+    let mut rng = Stream::new(seed).named("followed").rng();
+    let mut tracker = RangeTracker::new(anchors.clone(), Travel::Full, RangeSettings::default()).unwrap();
+    let (mut rows, mut held, mut wrong, mut longest, mut off) = (0, 0, 0, 0, f64::NAN);
+    for (k, [x, y]) in truth.iter().enumerate() {
+        let (truth, (name, place)) = (Vector3::new(*x, *y, 0.0), &anchors[k % anchors.len()]);
+        let range = (1.0 + scale) * (truth - place).norm() + bias + noise * rng.sample::<f64, _>(StandardNormal);
+        let Some(found) = tracker.push(0.1 * k as f64, name, range).unwrap() else {
+            continue;
+        };
+        rows += 2;
+        held += (0..2)
+            .filter(|i| (found.bands[*i].0..=found.bands[*i].1).contains(&truth[*i]))
+            .count();
+        let is_wrong = found.normalised_error(&truth).unwrap() > WRONG && !found.lost;
+        wrong = if is_wrong { wrong + 1 } else { 0 };
+        longest = longest.max(wrong);
+        off = (found.position - truth).norm();
+    }
+    (rows, held, longest, off)
+}
+
+/// Defect: the slowest speed of the bank was that of a slow walk. A target that rested while bias and scale were unknown was drawn metres away,
+/// under a narrow band.
+#[test]
+fn a_target_that_rests_first_is_not_drawn_away() {
+    let places = [[0.0, 0.0], [30.0, 2.0], [28.0, 24.0], [-2.0, 20.0]];
+    for (seed, place) in [[20.0, 7.0], [4.0, 16.0]].into_iter().enumerate() {
+        let mut truth = vec![place; 1000];
+        // It walks in the end.
+        truth.extend((1..100).map(|k| [place[0] + 0.08 * f64::from(k), place[1]]));
+        let (_, _, longest, off) = followed(&places, &truth, (0.3, 0.03, 0.05), seed as u64);
+        assert!(longest < LONG && off < 0.5, "{place:?}: {longest}, {off}");
+    }
+}
+
+/// Defect: of anchors on a line ranges never tell the side, and one side was dropped while the target was near the line.
+#[test]
+fn anchors_on_a_line_leave_both_sides() {
+    let places: Vec<[f64; 2]> = (0..6).map(|i| [8.0 * f64::from(i), 0.0]).collect();
+    let truth: Vec<[f64; 2]> = (0..1200)
+        .map(|k| {
+            let time = 0.1 * f64::from(k);
+            [20.0 + 18.0 * (0.05 * time).sin(), 2.2 + 2.0 * (0.11 * time).sin()]
+        })
+        .collect();
+    let (rows, held, longest, _) = followed(&places, &truth, (0.1, 0.0, 0.1), 3);
+    assert!(longest < LONG && 10 * held > 9 * rows, "{held} of {rows}, {longest}");
+}
+
+/// The height of a target that climbs, with anchors of several heights.
+#[test]
+fn a_height_that_changes_is_told() {
+    let anchors: Vec<(String, Vector3<f64>)> = hall()
+        .into_iter()
+        .zip([0.0, 6.0, 0.5, 7.0, 1.0])
+        .map(|((name, place), z)| (name, place + z * Vector3::z()))
+        .collect();
+    let mut rng = Stream::new(31).named("climb").rng();
+    let ranges: Vec<(f64, &str, f64)> = (0..400)
+        .map(|k| {
+            let (time, (name, place)) = (0.1 * k as f64, &anchors[k % 5]);
+            let truth = Vector3::new(
+                6.0 + 5.0 * (0.4 * time).sin(),
+                5.0 + 4.0 * (0.3 * time).cos(),
+                6.0 - 4.0 * (0.2 * time).cos(),
+            );
+            (time, name.as_str(), (truth - place).norm() + 0.03 * rng.sample::<f64, _>(StandardNormal))
+        })
+        .collect();
+    let settings = RangeSettings {
+        height: Height::Known(4.0),
+        ..RangeSettings::default()
+    };
+    let found = mistake_of(&anchors, settings, &ranges).unwrap();
+    assert!(
+        matches!(found, Some(Mistake::HeightChanges { mean, .. }) if (2.0..10.0).contains(&mean)),
+        "{found:?}"
+    );
+}
+
 /// Ranges of the hall that a table has wrong are explained by what is wrong, and right ones, or one long anchor, by nothing.
 #[test]
 fn mistakes_of_tables_are_found() {
@@ -540,6 +629,8 @@ fn mistakes_of_tables_are_found() {
     turned[1].1 = Vector3::new(1.0, 14.0, 0.0);
     assert_eq!(found(&turned, &as_they_are, &mut noise), Some(Mistake::Axes("h1".to_owned())));
     assert_eq!(found(&anchors, &|_, range| range * range, &mut noise), Some(Mistake::Squared));
+    assert_eq!(found(&anchors, &|_, range| 2.0 * range, &mut noise), Some(Mistake::Doubled));
+    assert_eq!(found(&anchors, &|_, range| 100.0 * range, &mut noise), Some(Mistake::Unit(0.01)));
     assert_eq!(found(&anchors, &|_, range| range / 0.149_896_229, &mut noise), Some(Mistake::RoundTrip));
 }
 
