@@ -3,6 +3,7 @@
 use super::instant::Reports;
 use crate::arguments::{Model, TrackOptions};
 use crate::error::Error;
+use crate::numbers::short;
 use crate::say::say;
 use fewbits_filters::fit::SensorModel;
 use fewbits_table::names::quoted;
@@ -96,7 +97,7 @@ impl Sensor {
     fn say_uncorrected(&self, file: &Path, drifts: bool) {
         let (name, file, model) = (&self.name, file.display(), &self.model);
         if model.delay != 0.0 {
-            say!("{file}: {name} is {} s late, which is not corrected here", model.delay);
+            say!("{file}: {name} is {} s late, which is not corrected here", short(model.delay));
         }
         if drifts && model.slope != 0.0 {
             say!("{file}: the offset of {name} drifts by {} per second, which is not followed here", model.slope);
