@@ -208,11 +208,7 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
     let jumps = problem.model.jumps(&problem.readings, &problem.scale);
     let counts: Vec<usize> = problem.readings.by_sensor.iter().map(Vec::len).collect();
     let tests = tests_of_fit::of(&residuals, &counts);
-    let own = estimates
-        .iter()
-        .find(|one| one.quantity == Quantity::Noise(relative_to));
-    let error = own.map_or(0.0, |own| own.standard_error);
-    let correlations = tests_of_fit::correlations(instants, &problem.model, relative_to, error);
+    let correlations = tests_of_fit::correlations(instants, &problem.model, relative_to);
     let model = problem.model.clone();
     let returns = if request.time_constant { None } else { problem.returns() };
     Ok(Fit {

@@ -147,8 +147,8 @@ impl Off {
 }
 
 /// Correlations of the noises of two sensors beside a third: of what both are off from its values, less what its own noise, and the level
-/// between its values, bring into both. `error`: the standard error of its noise, if that counts.
-pub(super) fn correlations(instants: &[Instant], model: &LevelModel, reference: usize, error: f64) -> Vec<Correlation> {
+/// between its values, bring into both.
+pub(super) fn correlations(instants: &[Instant], model: &LevelModel, reference: usize) -> Vec<Correlation> {
     let begin = instants.first().map_or(0.0, |instant| instant.seconds);
     let level: Vec<(f64, f64)> = instants
         .iter()
@@ -200,9 +200,6 @@ pub(super) fn correlations(instants: &[Instant], model: &LevelModel, reference: 
                 let shared = first.gain * second.gain * (noise * own_variance + way * rate);
                 Some((own.value * its.value - shared) / (first.noise * second.noise))
             };
-            // An error of the third sensor's variance is one of every product.
-            let own =
-                2.0 * model.sensors[reference].noise * error * first.gain * second.gain / (first.noise * second.noise);
             let products: Vec<f64> = rows.iter().filter_map(product).collect();
             if products.len() < MIN_READINGS {
                 continue;
@@ -213,7 +210,7 @@ pub(super) fn correlations(instants: &[Instant], model: &LevelModel, reference: 
             found.push(Correlation {
                 sensors: (one, other),
                 value,
-                standard_error: (squares.sqrt() / number).hypot(own),
+                standard_error: squares.sqrt() / number,
             });
         }
     }
