@@ -153,7 +153,7 @@ fn applied(options: &DesignOptions) -> Result<DesignOptions, Error> {
         }
     }
     if options.file.is_none() && options.prior.is_none() {
-        options.prior = found.prior();
+        options.prior = found.prior_option();
         if options.prior.is_none() {
             return Err(Error::Needed {
                 option: "a FILE or --prior",

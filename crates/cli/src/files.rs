@@ -167,6 +167,7 @@ impl Files {
             Task::Design(options) => {
                 let mut files = Self::default().writing([&options.output, &options.plot]);
                 files.reads.extend(options.file.iter().map(PathBuf::from));
+                files.reads.extend(options.settings.clone());
                 files
             }
             Task::Send(options) => {

@@ -36,6 +36,10 @@ pub(crate) struct FitOptions {
     /// Noises that are known, as `0.3` or `column=0.3`: standard deviations.
     #[arg(long, default_value = "", value_name = "DEVIATION")]
     pub(crate) noise: String,
+    /// Detection limits, as `0.25..` or `0.25..40`: a value at or beyond a limit says only that the measurement is beyond it.
+    /// `no`: there are none. Default: found, if many values are equal at an end where others hardly ever are, and it is not 0.
+    #[arg(long, value_name = "LOW..HIGH|no", allow_hyphen_values = true)]
+    pub(crate) limits: Option<String>,
     /// Write what was found as JSON to standard output.
     #[arg(long)]
     pub(crate) json: bool,

@@ -31,6 +31,9 @@ pub(crate) struct CentreOptions {
     /// With `--init`: number of sensors.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub(crate) sensors: u32,
+    /// With `--init`: the sensors of this file of `fewbits fit -o`, with their noises, offsets, gains and thresholds, and its model.
+    #[arg(long, value_name = "FILE.json", requires = "init", conflicts_with = "sensors")]
+    pub(crate) settings: Option<PathBuf>,
     /// Print the configuration of this sensor with its key, which follows from the fleet key, and end.
     #[arg(long, value_name = "NUMBER", conflicts_with = "init")]
     pub(crate) sensor_file: Option<u32>,
@@ -48,6 +51,7 @@ impl CentreOptions {
             new_start: false,
             init: false,
             sensors: 2,
+            settings: None,
             sensor_file: None,
         }
     }

@@ -24,6 +24,7 @@ mod live;
 mod look;
 mod manifest;
 mod many;
+mod measured;
 mod naming;
 mod node;
 mod notes;

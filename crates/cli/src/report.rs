@@ -1,8 +1,9 @@
 //! Kinds of reports with their two halves, at sensor and centre.
 
 use crate::error::Failure;
+use crate::measured::Measured;
 use fewbits_cfwmd::scheme::CovarianceFeedback;
-use fewbits_core::{FullValue, Gaussian, Link, NumberFormat, OnAxes, SchemeNode, SensorNode};
+use fewbits_core::{FullValue, Gaussian, Link, NumberFormat, SchemeNode, SensorNode};
 use fewbits_dymbo::{InnovationWord, Prediction, SignBit};
 use fewbits_filters::centre::{RemoteSensor, Reporting};
 use fewbits_models::LinearSensor;
@@ -148,18 +149,18 @@ impl Report {
         matches!(self, Self::Censored { .. })
     }
 
-    /// The centre's half of a sensor that reads coordinate `reads` of the state, with the variance of its noise.
+    /// The centre's half of a sensor.
     pub(crate) fn remote<const D: usize>(
         self,
-        reads: usize,
-        variance: f64,
+        measured: Measured,
         link: Link,
     ) -> Result<Box<dyn RemoteSensor<D>>, Failure> {
-        let sensing = OnAxes::<_, D, 1>::new(LinearSensor::direct(variance)?, [reads])?;
+        let variance = measured.variance;
+        measured.check::<D>()?;
         Ok(match self {
             Self::Sign => {
-                let ask = |_: &Gaussian<D>, m: &Gaussian<1>| m.mean()[0];
-                Box::new(Reporting::new(sensing, SignBit::new(variance)?, link, ask))
+                let ask = move |_: &Gaussian<D>, m: &Gaussian<1>| measured.asked(m.mean()[0]);
+                Box::new(Reporting::new(measured, SignBit::new(variance)?, link, ask))
             }
             Self::Word { bits } => {
                 let ask = |_: &Gaussian<D>, m: &Gaussian<1>| Prediction {
@@ -167,13 +168,13 @@ impl Report {
                     deviation: m.covariance()[0].sqrt(),
                 };
                 let scheme = InnovationWord::new(variance, bits as usize)?;
-                Box::new(Reporting::new(sensing, scheme, link, ask))
+                Box::new(Reporting::new(measured, scheme, link, ask))
             }
-            Self::Value => Box::new(Reporting::values(sensing, FullValue::new(variance)?, link)),
+            Self::Value => Box::new(Reporting::values(measured, FullValue::new(variance)?, link)),
             Self::Censored { threshold } => {
-                let ask = |state: &Gaussian<D>, _: &Gaussian<1>| *state;
-                let scheme = censored::<D>(reads, variance, threshold)?;
-                Box::new(Reporting::new(coordinate::<D>(reads, variance)?, scheme, link, ask))
+                let ask = move |state: &Gaussian<D>, _: &Gaussian<1>| measured.told(state);
+                let scheme = censored::<D>(measured.reads, variance, threshold)?;
+                Box::new(Reporting::new(measured, scheme, link, ask))
             }
         })
     }
@@ -189,21 +190,14 @@ impl Report {
     }
 }
 
-/// What a sensor of one coordinate of the state measures.
-fn coordinate<const D: usize>(reads: usize, variance: f64) -> Result<LinearSensor<D, 1>, Failure> {
-    if reads >= D {
-        return Err(format!("reads is {reads}: expected below {D}, the coordinates of the model").into());
-    }
-    let direction = SVector::from_fn(|i, _| if i == reads { 1.0 } else { 0.0 });
-    Ok(LinearSensor::scalar(direction, variance)?)
-}
-
 /// The scheme of a censored report.
 fn censored<const D: usize>(
     reads: usize,
     variance: f64,
     threshold: f64,
 ) -> Result<CovarianceFeedback<LinearSensor<D, 1>, D, 1>, Failure> {
-    let sensing = coordinate::<D>(reads, variance)?;
+    Measured::of(reads, variance).check::<D>()?;
+    let direction = SVector::from_fn(|i, _| if i == reads { 1.0 } else { 0.0 });
+    let sensing = LinearSensor::scalar(direction, variance)?;
     Ok(CovarianceFeedback::new(sensing, threshold, NumberFormat::Double)?)
 }

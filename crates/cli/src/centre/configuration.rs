@@ -1,6 +1,9 @@
 //! `centre.toml`: what it contains, and all faults of it at once.
 
+use super::calibrated;
+use super::entries::{Entry, Model, Prior, numbers};
 use crate::error::Error;
+use crate::measured::Measured;
 use crate::private;
 use crate::report::Report;
 use fewbits_link::{FleetKey, Key};
@@ -10,9 +13,6 @@ use std::collections::HashMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
-
-/// Largest number of sensors that one entry names.
-const MAX_GROUP: u32 = 100_000;
 
 /// Content of `centre.toml`.
 pub(super) struct Configuration {
@@ -45,84 +45,12 @@ pub(super) struct Coordinate {
     pub(super) unit: String,
 }
 
-#[derive(Debug, Deserialize, Clone, Copy)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-pub(super) enum Model {
-    RandomWalk {
-        density: f64,
-    },
-    OrnsteinUhlenbeck {
-        mean: f64,
-        time_constant: f64,
-        variance: f64,
-    },
-    ConstantVelocity {
-        density: f64,
-    },
-    ConstantVelocity2d {
-        density: f64,
-    },
-}
-
-impl Model {
-    /// What the coordinates of the state are, if nothing names them.
-    fn names(self) -> &'static [&'static str] {
-        match self {
-            Self::RandomWalk { .. } | Self::OrnsteinUhlenbeck { .. } => &["level"],
-            Self::ConstantVelocity { .. } => &["position", "velocity"],
-            Self::ConstantVelocity2d { .. } => &["x", "velocity of x", "y", "velocity of y"],
-        }
-    }
-
-    /// Number of coordinates of the state.
-    pub(super) fn coordinates(self) -> usize {
-        self.names().len()
-    }
-}
-
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Prior {
-    pub(super) mean: Vec<f64>,
-    pub(super) deviation: Vec<f64>,
-}
-
-/// An entry `[[sensor]]`: one sensor, or several that are alike.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Entry {
-    number: Option<u32>,
-    /// Numbers as `1-40,50`.
-    numbers: Option<String>,
-    /// Without it the key follows from the fleet's.
-    key: Option<String>,
-    /// Version of a key that follows from the fleet's.
-    #[serde(default = "first")]
-    key_version: u32,
-    /// Address of the sensor, if it is known beforehand.
-    address: Option<String>,
-    /// Index of the coordinate of the state that the sensor measures.
-    #[serde(default)]
-    reads: usize,
-    /// Standard deviation of its measurement noise.
-    deviation: f64,
-    report: Report,
-    /// Probability that a question or its report is lost.
-    #[serde(default)]
-    loss: f64,
-}
-
-fn first() -> u32 {
-    1
-}
-
 #[derive(Clone)]
 pub(super) struct Sensor {
     pub(super) number: u32,
     pub(super) key: Key,
     pub(super) address: Option<String>,
-    pub(super) reads: usize,
-    pub(super) deviation: f64,
+    pub(super) measured: Measured,
     pub(super) report: Report,
     pub(super) loss: f64,
 }
@@ -208,8 +136,18 @@ impl Configuration {
         }
         let (state, durable) = (faults.take(&mut table, "state"), faults.take(&mut table, "durable"));
         let seed = faults.take(&mut table, "seed");
-        let model = faults.need::<Model>(&mut table, "model");
-        let prior = faults.need::<Prior>(&mut table, "prior");
+        let found = match faults.take::<PathBuf>(&mut table, "settings") {
+            Some(path) => Some(faults.keep("settings", calibrated::read(&beside(file, &path)))?),
+            None => None,
+        };
+        let model = match &found {
+            Some(found) if !table.contains_key("model") => Some(calibrated::model(found)),
+            _ => faults.need::<Model>(&mut table, "model"),
+        };
+        let prior = match found.as_ref().and_then(calibrated::prior) {
+            Some(prior) if !table.contains_key("prior") => Some(prior),
+            _ => faults.need::<Prior>(&mut table, "prior"),
+        };
         if let (Some(model), Some(prior)) = (model, &prior) {
             check_prior(model.coordinates(), prior, faults);
         }
@@ -245,6 +183,9 @@ impl Configuration {
                 continue;
             };
             check_entry(&name, &entry, model.map(Model::coordinates), faults);
+            let measured = faults.keep(&name, calibrated::measured(&entry, found.as_ref()));
+            // A fault hides no other one of the same sensor.
+            let measured = measured.unwrap_or(Measured::of(entry.reads, 1.0));
             let Some(numbers) = faults.keep(&name, numbers(&entry)) else {
                 continue;
             };
@@ -257,7 +198,7 @@ impl Configuration {
                 let Some(key) = faults.keep(&format!("sensor {number}"), key(&entry, number, fleet.as_ref())) else {
                     break;
                 };
-                sensors.push(Sensor::of(&entry, number, key));
+                sensors.push(Sensor::of(&entry, measured, number, key));
             }
         }
         if sensors.is_empty() && faults.0.is_empty() {
@@ -281,6 +222,11 @@ impl Configuration {
     }
 }
 
+/// A path that a configuration names: beside it, whatever folder the command runs in.
+fn beside(file: &Path, path: &Path) -> PathBuf {
+    file.parent().unwrap_or(Path::new("")).join(path)
+}
+
 fn check_prior(coordinates: usize, prior: &Prior, faults: &mut Faults) {
     if (prior.mean.len(), prior.deviation.len()) != (coordinates, coordinates) {
         faults.add(format_args!(
@@ -298,44 +244,14 @@ fn check_prior(coordinates: usize, prior: &Prior, faults: &mut Faults) {
 /// The fleet's secret, in the file itself or, better, in one of its own.
 fn fleet_key(table: &mut Table, file: &Path, faults: &mut Faults) -> Option<FleetKey> {
     let text = match faults.take::<PathBuf>(table, "fleet_key_file") {
-        Some(path) => {
-            // Beside the configuration, whatever folder the command runs in.
-            let path = file.parent().unwrap_or(Path::new("")).join(path);
-            Some(faults.keep("fleet_key_file", private::text(&path))?)
-        }
+        Some(path) => Some(faults.keep("fleet_key_file", private::text(&beside(file, &path)))?),
         None => faults.take::<String>(table, "fleet_key"),
     };
     faults.keep("fleet key", FleetKey::from_hex(text?.trim()))
 }
 
-fn numbers(entry: &Entry) -> Result<Vec<u32>, String> {
-    let text = match (entry.number, &entry.numbers) {
-        (Some(number), None) => return Ok(vec![number]),
-        (None, Some(text)) if entry.key.is_none() && entry.address.is_none() => text,
-        (None, Some(_)) => return Err("`key` and `address` are those of one sensor: expected `number`".to_owned()),
-        _ => return Err("expected either `number` or `numbers`".to_owned()),
-    };
-    let mut all = Vec::new();
-    for part in text.split(',').map(str::trim) {
-        let (first, last) = part.split_once('-').unwrap_or((part, part));
-        match (first.trim().parse::<u32>(), last.trim().parse::<u32>()) {
-            (Ok(first), Ok(last)) if first <= last && last - first < MAX_GROUP => all.extend(first..=last),
-            (Ok(first), Ok(last)) if first <= last => {
-                return Err(format!(
-                    "numbers is `{text}`: expected at most {MAX_GROUP} numbers in a range; give several"
-                ));
-            }
-            _ => return Err(format!("numbers is `{text}`: expected numbers and ranges as `1-40,50`")),
-        }
-    }
-    Ok(all)
-}
-
 /// The numbers of an entry, whether it stands for one sensor or many.
 fn check_entry(name: &str, entry: &Entry, coordinates: Option<usize>, faults: &mut Faults) {
-    if !(entry.deviation.is_finite() && entry.deviation > 0.0) {
-        faults.add(format_args!("{name}: deviation is {}: expected above 0", entry.deviation));
-    }
     if !(0.0..1.0).contains(&entry.loss) {
         faults.add(format_args!("{name}: loss is {}: expected 0 or more, below 1", entry.loss));
     }
@@ -356,13 +272,17 @@ fn key(entry: &Entry, number: u32, fleet: Option<&FleetKey>) -> Result<Key, Erro
 }
 
 impl Sensor {
-    fn of(entry: &Entry, number: u32, key: Key) -> Self {
+    /// Standard deviation of its noise.
+    pub(super) fn deviation(&self) -> f64 {
+        self.measured.variance.sqrt()
+    }
+
+    fn of(entry: &Entry, measured: Measured, number: u32, key: Key) -> Self {
         Self {
             number,
             key,
             address: entry.address.clone(),
-            reads: entry.reads,
-            deviation: entry.deviation,
+            measured,
             report: entry.report,
             loss: entry.loss,
         }

@@ -1,10 +1,13 @@
 //! `fewbits centre --init`: a commented configuration, the fleet's key, and the files of its sensors, all readable by their owner only.
 
+use super::calibrated;
 use super::configuration::Configuration;
 use crate::Ending;
+use crate::arguments::CentreOptions;
 use crate::error::Error;
 use crate::report::Report;
 use crate::say::say;
+use crate::track::applied::Found;
 use fewbits_link::{FleetKey, write_private};
 use std::io::Read;
 use std::path::Path;
@@ -12,7 +15,40 @@ use std::path::Path;
 /// Bytes of a key.
 const KEY_BYTES: usize = 32;
 
-fn template(sensors: u32) -> String {
+/// What moves, what is known of it, and the sensors, in words that a person edits. `settings`: the file of `fit`, as the configuration names it.
+fn world(sensors: u32, settings: Option<(&str, &Found)>) -> String {
+    const MODELS: &str = "# How the state moves: random-walk (density), ornstein-uhlenbeck (mean, time_constant, variance),\n\
+        # constant-velocity (density), constant-velocity2d (density).\n";
+    const PRIOR: &str = "# What is known before the first slot, per coordinate of the state.\n\
+        prior = { mean = [0.0], deviation = [10.0] }\n";
+    const REPORT: &str = "report = \"bit\"               # \"bit\", \"word:2\" to \"word:4\", \"value\", or \"silent:1.5\" (standard deviations)\n";
+    const LOSS: &str = "loss = 0.05                  # probability that a question or its report is lost\n\
+        # key_version = 2            # after a sensor has lost its key or its state\n";
+    let Some((path, found)) = settings else {
+        return format!(
+            "{MODELS}model = {{ kind = \"random-walk\", density = 0.01 }}\n{PRIOR}\n[[sensor]]\n\
+             numbers = \"1-{sensors}\"          # or `number = 1` for a sensor with settings of its own\n\
+             deviation = 0.5              # standard deviation of its measurement noise\n\
+             {REPORT}reads = 0                    # the coordinate that it measures\n{LOSS}"
+        );
+    };
+    let path = toml::Value::String(path.to_owned());
+    let mut text = format!(
+        "# Model, noises, offsets, gains and thresholds, by the names of sensors. `model`, `prior`, `deviation`, `offset`, `gain` and\n\
+         # `threshold` come before it.\nsettings = {path}\n"
+    );
+    if found.prior().is_none() {
+        // A level that wanders may begin anywhere.
+        text += PRIOR;
+    }
+    for (i, sensor) in found.sensors.iter().enumerate() {
+        let name = toml::Value::String(sensor.name.clone());
+        text += &format!("\n[[sensor]]\nnumber = {}\nname = {name}\n{REPORT}{LOSS}", i + 1);
+    }
+    text
+}
+
+fn template(sensors: u32, settings: Option<(&str, &Found)>) -> String {
     format!(
         r#"# A fusion centre: run it with `fewbits centre FILE`, check it with `fewbits check FILE`.
 
@@ -22,41 +58,39 @@ state = "centre.state"       # what survives the process; `durable = true`: a po
 fleet_key_file = "fleet.key" # the keys of all sensors without a `key` follow from it
 revoked = []                 # numbers of sensors whose frames are refused, as [3, 7]
 
-# How the state moves: random-walk (density), ornstein-uhlenbeck (mean, time_constant, variance),
-# constant-velocity (density), constant-velocity2d (density).
-model = {{ kind = "random-walk", density = 0.01 }}
-# What is known before the first slot, per coordinate of the state.
-prior = {{ mean = [0.0], deviation = [10.0] }}
-
-[[sensor]]
-numbers = "1-{sensors}"          # or `number = 1` for a sensor with settings of its own
-deviation = 0.5              # standard deviation of its measurement noise
-report = "bit"               # "bit", "word:2" to "word:4", "value", or "silent:1.5" (standard deviations)
-reads = 0                    # the coordinate that it measures
-loss = 0.05                  # probability that a question or its report is lost
-# key_version = 2            # after a sensor has lost its key or its state
-"#
+{}"#,
+        world(sensors, settings)
     )
 }
 
-/// The file of one sensor. `given` is the configuration that it must agree with; without it, the template.
-fn sensor(number: u32, key: &str, centre: &str, given: Option<(&Configuration, &super::Sensor)>) -> String {
-    let (deviation, report) = given.map_or((0.5, Report::Sign), |(_, like)| (like.deviation, like.report));
+/// The file of one sensor. `coordinates` and `reads`: of a sensor that is told the covariance of the state.
+fn sensor(
+    number: u32,
+    key: &str,
+    centre: &str,
+    (deviation, report): (f64, Report),
+    told: Option<(usize, usize)>,
+) -> String {
     let mut text = format!(
         "centre = \"{centre}\"   # the centre's address, as this sensor reaches it\nnumber = {number}\nkey = \"{key}\"\n\
          deviation = {deviation}\nreport = \"{}\"               # as in the centre's file\nstate = \"sensor-{number}.state\"\n",
         report.word()
     );
-    if let Some((given, like)) = given.filter(|_| report.needs_coordinates()) {
-        // A censoring sensor is told the covariance of the whole state.
-        text += &format!("coordinates = {}\nreads = {}\n", given.model.coordinates(), like.reads);
+    if let Some((coordinates, reads)) = told {
+        text += &format!("coordinates = {coordinates}\nreads = {reads}\n");
     }
     text
 }
 
 /// Writes the files. None of them may exist.
-pub(super) fn run(file: &Path, sensors: u32) -> Result<Ending, Error> {
+pub(super) fn run(options: &CentreOptions) -> Result<Ending, Error> {
+    let (file, settings) = (&options.configuration, &options.settings);
     let folder = file.parent().unwrap_or(Path::new(""));
+    let found = settings.as_deref().map(calibrated::read).transpose()?;
+    let path = settings.as_deref().map(|path| from(folder, path)).transpose()?;
+    let sensors = found
+        .as_ref()
+        .map_or(options.sensors, |found| found.sensors.len() as u32);
     let mut bytes = [0; KEY_BYTES];
     let random = "/dev/urandom";
     let read = std::fs::File::open(random).and_then(|mut source| source.read_exact(&mut bytes));
@@ -64,11 +98,13 @@ pub(super) fn run(file: &Path, sensors: u32) -> Result<Ending, Error> {
     let hex: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
     let fleet = FleetKey::new(&bytes)?;
     let mut files = vec![
-        (file.to_owned(), template(sensors)),
+        (file.to_owned(), template(sensors, path.as_deref().zip(found.as_ref()))),
         (folder.join("fleet.key"), hex + "\n"),
     ];
     for number in 1..=sensors {
-        let text = sensor(number, &fleet.hex_of(number, 1)?, "192.168.1.5:7070", None);
+        let own = found.as_ref().map(|found| &found.sensors[number as usize - 1].model);
+        let kind = (own.map_or(0.5, |own| own.noise), Report::Sign);
+        let text = sensor(number, &fleet.hex_of(number, 1)?, "192.168.1.5:7070", kind, None);
         files.push((folder.join(format!("sensor-{number}.toml")), text));
     }
     if let Some((path, _)) = files.iter().find(|(path, _)| path.exists()) {
@@ -81,6 +117,21 @@ pub(super) fn run(file: &Path, sensors: u32) -> Result<Ending, Error> {
     Ok(Ending::Good)
 }
 
+/// A path as seen from a folder: below it, or from the root.
+fn from(folder: &Path, path: &Path) -> Result<String, Error> {
+    let whole = |path: &Path| {
+        path.canonicalize()
+            .map_err(Error::io(&path.display().to_string(), "read"))
+    };
+    let here = if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        folder
+    };
+    let (folder, path) = (whole(here)?, whole(path)?);
+    Ok(path.strip_prefix(&folder).unwrap_or(&path).display().to_string())
+}
+
 /// Prints the configuration of one sensor, with the key that follows from the fleet's.
 pub(super) fn print_sensor(file: &Path, given: &Configuration, number: u32) -> Result<Ending, Error> {
     let name = file.display().to_string();
@@ -90,6 +141,8 @@ pub(super) fn print_sensor(file: &Path, given: &Configuration, number: u32) -> R
     let Some(fleet) = &given.fleet else {
         return Err(Error::content(&name, "no fleet key: the keys of its sensors stand in it"));
     };
+    let told = like.report.needs_coordinates();
+    let told = told.then_some((given.model.coordinates(), like.measured.reads));
     // The version is not kept: the key whose fingerprint is that of the configuration is the one.
     for version in 1..=u32::from(u16::MAX) {
         if fleet.key_of(number, version)?.fingerprint() == like.key.fingerprint() {
@@ -99,7 +152,8 @@ pub(super) fn print_sensor(file: &Path, given: &Configuration, number: u32) -> R
                     number,
                     &fleet.hex_of(number, version)?,
                     &crate::place::shown(&given.listen),
-                    Some((given, like)),
+                    (like.deviation(), like.report),
+                    told,
                 ),
             )?;
             return Ok(Ending::Good);

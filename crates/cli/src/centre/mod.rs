@@ -1,6 +1,8 @@
 //! `fewbits centre`: a fusion centre over UDP, MQTT or zenoh. Each slot's estimate is a row on standard output.
 
+mod calibrated;
 mod configuration;
+mod entries;
 mod home;
 mod init;
 mod log;
@@ -12,7 +14,8 @@ use crate::error::{Error, Failure};
 use crate::place::Place;
 use crate::private::configured;
 use crate::say::say;
-use configuration::{Configuration, Faults, Model, Sensor};
+use configuration::{Configuration, Faults, Sensor};
+use entries::Model;
 use fewbits_core::{Evolution, Gaussian, Link};
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::FusionCentre;
@@ -32,7 +35,7 @@ use std::path::Path;
 pub(crate) fn run(options: &CentreOptions) -> Result<Ending, Error> {
     let file = &options.configuration;
     if options.init {
-        return init::run(file, options.sensors);
+        return init::run(options);
     }
     let given = Configuration::read(file)?;
     if let Some(number) = options.sensor_file {
@@ -160,7 +163,7 @@ fn with<const D: usize, T: Transport>(
     };
     let members = given.sensors.iter().map(member).collect();
     let mut settings = CentreSettings::new(members, Schedule::new(period));
-    let meaning = |sensor: &Sensor| sensor.report.meaning(sensor.deviation, (D, sensor.reads));
+    let meaning = |sensor: &Sensor| sensor.report.meaning(sensor.deviation(), (D, sensor.measured.reads));
     settings.meanings = given.sensors.iter().map(meaning).collect();
     let store = given.state.clone().map(|path| match given.durable {
         true => Store::new(path).durable(),
@@ -179,8 +182,7 @@ fn with<const D: usize, T: Transport>(
 }
 
 fn join<const D: usize>(centre: &mut FusionCentre<D, MomentFilter>, sensor: &Sensor) -> Result<(), Failure> {
-    let (variance, link) = (sensor.deviation * sensor.deviation, Link::lossy(sensor.loss)?);
-    let remote = sensor.report.remote(sensor.reads, variance, link)?;
+    let remote = sensor.report.remote(sensor.measured, Link::lossy(sensor.loss)?)?;
     Ok(centre.join_boxed(sensor.number, remote)?)
 }
 

@@ -3,6 +3,7 @@
 use super::instant::Reports;
 use crate::arguments::{Model, TrackOptions};
 use crate::error::Error;
+use crate::numbers::short;
 use crate::say::say;
 use fewbits_filters::fit::SensorModel;
 use fewbits_table::names::quoted;
@@ -15,9 +16,9 @@ pub(crate) struct Found {
     /// The sensor to which offsets are relative.
     pub(super) relative_to: String,
     /// Standard deviation of the level's change per root of a second.
-    pub(super) change: f64,
-    pub(super) time_constant: Option<f64>,
-    pub(super) mean: f64,
+    pub(crate) change: f64,
+    pub(crate) time_constant: Option<f64>,
+    pub(crate) mean: f64,
     pub(crate) sensors: Vec<Sensor>,
     /// Name, value and standard error of each parameter that was found; name and reason of each that was not.
     pub(super) estimates: Vec<(String, f64, f64)>,
@@ -63,14 +64,27 @@ impl Found {
     }
 
     /// Variance in the long run of a level that returns in so many seconds.
-    fn settled(&self, seconds: f64) -> f64 {
+    pub(crate) fn settled(&self, seconds: f64) -> f64 {
         0.5 * self.change * self.change * seconds
     }
 
-    /// Mean and standard deviation of the level in the long run, as a prior. `None` of a level that wanders.
-    pub(crate) fn prior(&self) -> Option<String> {
+    /// Mean and standard deviation of the level in the long run. `None` of a level that wanders.
+    pub(crate) fn prior(&self) -> Option<(f64, f64)> {
         let variance = self.settled(self.time_constant?);
-        Some(format!("{}±{}", self.mean, variance.sqrt()))
+        Some((self.mean, variance.sqrt()))
+    }
+
+    /// The same as the option `--prior`.
+    pub(crate) fn prior_option(&self) -> Option<String> {
+        let (mean, deviation) = self.prior()?;
+        Some(format!("{mean}±{deviation}"))
+    }
+
+    /// Says which faults of its sensors are not corrected. `drifts`: linear ones are neither.
+    pub(crate) fn say_uncorrected(&self, file: &Path, drifts: bool) {
+        self.sensors
+            .iter()
+            .for_each(|sensor| sensor.say_uncorrected(file, drifts));
     }
 }
 
@@ -78,6 +92,21 @@ impl Sensor {
     /// Standard deviation of its noise in the unit of the level.
     pub(crate) fn noise(&self) -> f64 {
         self.model.noise / self.model.gain.abs()
+    }
+
+    fn say_uncorrected(&self, file: &Path, drifts: bool) {
+        let (name, file, model) = (&self.name, file.display(), &self.model);
+        if model.delay != 0.0 {
+            say!("{file}: {name} is {} s late, which is not corrected here", short(model.delay));
+        }
+        if drifts && model.slope != 0.0 {
+            say!("{file}: the offset of {name} drifts by {} per second, which is not followed here", model.slope);
+        }
+        if model.walk > 0.0 {
+            say!(
+                "{file}: the offset of {name} wanders, which is not followed here: `track --align` finds the present one"
+            );
+        }
     }
 }
 
@@ -114,7 +143,6 @@ pub(super) fn applied(options: &TrackOptions, names: &[String]) -> Result<(Track
     let Some(path) = &options.settings else {
         return Ok((options, Vec::new()));
     };
-    let name = path.display().to_string();
     let found = Found::read(path)?;
     let mut corrections = Vec::new();
     let (mut noises, mut thresholds) = (Vec::new(), Vec::new());
@@ -131,15 +159,7 @@ pub(super) fn applied(options: &TrackOptions, names: &[String]) -> Result<(Track
                 gain: model.gain,
             }),
         }
-        if model.delay != 0.0 {
-            say!("{name}: {} is {} s late, which is not corrected here", sensor.name, model.delay);
-        }
-        if model.walk > 0.0 {
-            say!(
-                "{name}: the offset of {} wanders, which is not followed here: --align finds the present one",
-                sensor.name
-            );
-        }
+        sensor.say_uncorrected(path, false);
     }
     if options.noise.is_empty() {
         options.noise = noises.join(",");
@@ -155,7 +175,7 @@ pub(super) fn applied(options: &TrackOptions, names: &[String]) -> Result<(Track
             let after = (-variance * (-2.0 / seconds).exp_m1()).sqrt();
             options.model = Some(Model::Returning);
             options.change = Some(format!("{after}/1s"));
-            options.prior = options.prior.or(found.prior());
+            options.prior = options.prior.or(found.prior_option());
         }
         None if is_walk && options.change.is_none() => {
             options.change = Some(format!("{}/1s", found.change));

@@ -5,6 +5,7 @@ use super::columns::Kind;
 use super::first::values_of;
 use super::hints::{circle, growth};
 use super::instant::{Instant, Qualifier};
+use super::limits::{self, Ends};
 use super::rows::Instants;
 use super::stuck::Stuck;
 use crate::Ending;
@@ -17,9 +18,13 @@ use crate::say::say;
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 use fewbits_filters::calibration::{self, Reading};
-use fewbits_filters::fit::{Fit, Quantity, Request, SensorTest, fit};
+use fewbits_filters::fit::{Estimate, Fit, Quantity, Request, SensorTest, fit};
 use fewbits_recipes::rounding;
 use fewbits_table::Side;
+
+/// Values of a sensor from which a step of rounding is found, and by how much of its standard error that makes the noise larger, at least.
+const FEWEST: usize = 50;
+const VISIBLE: f64 = 0.2;
 
 /// Runs the task.
 pub(crate) fn run(options: &FitOptions) -> Result<Ending, Error> {
@@ -71,6 +76,10 @@ pub(crate) fn run(options: &FitOptions) -> Result<Ending, Error> {
         source: Box::new(source),
     };
     let mut readings = readings(&rows, &bits, &names, instants.file())?;
+    let mut told = Vec::new();
+    let ends = ends(options, &rows, (&bits, &names), &mut told)?;
+    told.iter().for_each(|line| say!("{line}"));
+    readings.iter_mut().for_each(|instant| limit(instant, &ends));
     let mut found = fit(&readings, names.len(), &request).map_err(refused)?;
     let steps = steps(&rows, &found, &bits);
     if steps.iter().any(Option::is_some) {
@@ -110,14 +119,52 @@ pub(crate) fn run(options: &FitOptions) -> Result<Ending, Error> {
     Ok(Ending::Good)
 }
 
-/// The step to which each sensor rounds, where it is coarser than its noise.
+/// Limits of each sensor: those of the option, or those that its values show.
+fn ends(
+    options: &FitOptions,
+    rows: &[Instant],
+    (bits, names): (&[usize], &[String]),
+    told: &mut Vec<String>,
+) -> Result<Vec<Ends>, Error> {
+    let stated = options.limits.as_deref().map(limits::limits).transpose()?;
+    let mut of = |sensor: usize| match stated {
+        _ if bits.contains(&sensor) => (None, None),
+        Some(stated) => stated,
+        None => limits::found(&values_of(rows, sensor), &names[sensor], told),
+    };
+    Ok((0..names.len()).map(&mut of).collect())
+}
+
+/// Values at or beyond a limit, as half-lines.
+fn limit(instant: &mut calibration::Instant, ends: &[Ends]) {
+    for (sensor, reading) in &mut instant.values {
+        let (low, high) = ends[*sensor];
+        let Some(value) = reading.value() else { continue };
+        let (mut lower, mut upper) = (f64::NEG_INFINITY, f64::INFINITY);
+        match (low, high) {
+            (Some(low), _) if value <= low => upper = low,
+            (_, Some(high)) if value >= high => lower = high,
+            _ => continue,
+        }
+        *reading = Reading::Within { lower, upper };
+    }
+}
+
+/// The step to which each sensor rounds, where it is coarser than its noise, or makes that larger than its standard error tells.
 fn steps(rows: &[Instant], found: &Fit, bits: &[usize]) -> Vec<Option<f64>> {
     let of = |sensor: usize| {
-        let noise = found.model.sensors[sensor].noise;
-        let is_value = !bits.contains(&sensor);
-        is_value
-            .then(|| rounding::coarse_step(&values_of(rows, sensor), noise))
-            .flatten()
+        if bits.contains(&sensor) {
+            return None;
+        }
+        let (values, noise) = (values_of(rows, sensor), found.model.sensors[sensor].noise);
+        let own = |one: &&Estimate| one.quantity == Quantity::Noise(sensor);
+        let error = found.estimates.iter().find(own).map(|own| own.standard_error);
+        let coarse = rounding::coarse_step(&values, noise);
+        coarse.or_else(|| {
+            let step = rounding::step(&values)?;
+            let more = noise - (noise * noise - (rounding::DEVIATION * step).powi(2)).max(0.0).sqrt();
+            (values.len() >= FEWEST && more > VISIBLE * error?).then_some(step)
+        })
     };
     (0..found.model.sensors.len()).map(of).collect()
 }
@@ -278,6 +325,19 @@ fn page(
             short(first - begin.seconds)
         );
     }
+    if let Some(seconds) = found.returns {
+        text += &format!(
+            "the level returns to a mean, in about {} s: without --find time-constant its change and the noises are off by more than stated\n",
+            short(seconds)
+        );
+    }
+    if let Some(one) = found.tests.iter().find(|one| one.is_persistent()) {
+        text += &format!(
+            "by {} the level keeps a direction for many rows, as in a cycle of a day, which is no part of the model: its change is too large, noises are \
+             too small\n",
+            names[one.sensor]
+        );
+    }
     for one in found.correlations.iter().filter(|one| one.is_certain()) {
         text += &format!(
             "{} and {} share noise: change, noises and their errors suppose that sensors do not, and are off by more than stated\n",
@@ -292,8 +352,8 @@ fn page(
             "is NOT explained"
         };
         text += &format!(
-            "{name} {word}: innovations of mean square {:.2} ({:+.1} deviations from 1), repetition {:+.1} deviations",
-            one.mean_square, one.size, one.repetition
+            "{name} {word}: innovations of mean square {:.2} ({:+.1} deviations from 1), repetition {:+.1} deviations, over many rows {:+.1}",
+            one.mean_square, one.size, one.repetition, one.persistence
         );
         text += &match one.wild {
             0 => "\n".to_owned(),

@@ -2,6 +2,7 @@
 
 use super::meaning::Seat;
 use crate::error::Failure;
+use crate::measured::Measured;
 use fewbits_core::{BitString, Gaussian, Link, Message, NumberFormat, OnAxes};
 use fewbits_filters::centre::{RemoteSensor, ReportTest, Reporting};
 use fewbits_models::LinearSensor;
@@ -33,7 +34,7 @@ const NARROW: f64 = 1e-6;
 pub(super) fn remote<const D: usize>(seat: &Seat) -> Result<Box<dyn RemoteSensor<D>>, Failure> {
     let link = Link::lossy(seat.loss)?;
     if !seat.is_stated() {
-        return seat.sends.remote::<D>(0, seat.noise * seat.noise, link);
+        return seat.sends.remote::<D>(Measured::of(0, seat.noise * seat.noise), link);
     }
     let usual = seat.usual() * seat.usual();
     let sensing = OnAxes::<_, D, 1>::new(LinearSensor::direct(usual)?, [0])?;

@@ -22,7 +22,7 @@ pub(super) struct Seconds {
 impl Seconds {
     pub(super) fn new(base: TimeBase, is_of_day: bool) -> Self {
         let tick = match base {
-            TimeBase::Clock { decimals, .. } => 0.1_f64.powi(i32::from(decimals)),
+            TimeBase::Clock { decimals, .. } => 1.0 / 10_f64.powi(i32::from(decimals)),
             _ => 1.0,
         };
         Self {

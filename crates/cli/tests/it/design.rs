@@ -114,3 +114,20 @@ fn a_sensor_without_noise_is_designed() {
         assert!((edge.as_f64().unwrap() - expected).abs() < 0.01, "{design}");
     }
 }
+
+/// Defect: encoders were numbered by place, so that the one of sensor 1, if sensor 0 sends nothing, had the name of sensor 0's.
+#[test]
+fn encoders_have_the_numbers_of_their_sensors() {
+    let folder = tempfile::tempdir().unwrap();
+    let job = |form: &str| {
+        let words = format!("design --prior 20±4 --noise 1,2,1 --bits 0,2,1 --form {form}");
+        text(&good(folder.path(), &words.split(' ').collect::<Vec<_>>(), b""))
+    };
+    let (c, rust) = (job("c"), job("rust"));
+    assert!(
+        c.contains("fewbits_encode_1(") && c.contains("fewbits_encode_2(") && !c.contains("fewbits_encode_0"),
+        "{c}"
+    );
+    assert!(c.contains("received from sensors 1, 2, in this order") && c.contains("fewbits_words_2["), "{c}");
+    assert!(rust.contains("WORDS_2") && !rust.contains("WORDS_0"), "{rust}");
+}

@@ -281,3 +281,64 @@ fn shared_noise_copies_and_a_design_from_what_was_found() {
     let none = refused(folder.path(), &["design", "--settings", "walk.json"], b"");
     assert!(none.contains("--prior") && none.contains("wanders"), "{none}");
 }
+
+/// Defects: values at a detection limit were taken for values (offset of .13 for 0, noise of .17 for .2), and rounding finer than the noise was part of it; a
+/// level that returns, or has a cycle of a day, was fitted as a walk without a word.
+#[test]
+fn limits_rounding_and_levels_that_are_no_walk() {
+    let folder = tempfile::tempdir().unwrap();
+    let fitted = |table: &str, more: &[&str]| {
+        let words = [&["fit", "-"], more].concat();
+        let output = fewbits(folder.path(), &words, table.as_bytes());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        (text(&output.stdout), text(&output.stderr))
+    };
+    let numbers = &mut Numbers(21);
+    let (mut level, mut returning) = (0.0, 0.0);
+    let (mut clipped, mut rounded, mut day, mut back) = [const { String::new() }; 4].into();
+    let head = "time,a,b\n";
+    for table in [&mut clipped, &mut rounded, &mut day, &mut back] {
+        *table += head;
+    }
+    for row in 0..500 {
+        level += 0.1 * numbers.normal();
+        returning += -0.15 * returning + 0.5 * numbers.normal();
+        let seconds = 600 * row;
+        let cycle = 3.0 * (f64::from(row) * std::f64::consts::TAU / 144.0).sin();
+        let (one, two) = (0.2 * numbers.normal(), 0.4 * numbers.normal());
+        clipped += &format!("{seconds},{:.4},{:.4}\n", (20.0 + level + one).min(20.3), 20.0 + level + two);
+        let coarse = |value: f64| 0.25 * (4.0 * value).round();
+        rounded += &format!("{seconds},{:.2},{:.2}\n", coarse(20.0 + level + one), coarse(20.0 + level + two));
+        day += &format!("{seconds},{:.4},{:.4}\n", 20.0 + cycle + one, 20.0 + cycle + two);
+        back += &format!("{seconds},{:.4},{:.4}\n", 20.0 + returning + one, 20.0 + returning + two);
+    }
+    let near = |table: &str, expected: [f64; 2]| {
+        let found: serde_json::Value = serde_json::from_str(&fitted(table, &["--json"]).0).unwrap();
+        for (sensor, expected) in expected.into_iter().enumerate() {
+            let name = format!("noise of {}", ["a", "b"][sensor]);
+            let all = found["estimates"].as_array().unwrap();
+            let own = all.iter().find(|one| one[0] == name).unwrap();
+            let off = (own[1].as_f64().unwrap() - expected) / own[2].as_f64().unwrap();
+            assert!(off.abs() < 3.5, "{own}");
+        }
+    };
+    near(&clipped, [0.2, 0.4]);
+    near(&rounded, [0.2, 0.4]);
+    assert!(
+        fitted(&clipped, &[])
+            .1
+            .contains("a detection limit, as --limits ..20.3 says")
+    );
+    assert!(!fitted(&clipped, &["--limits", "no"]).1.contains("limit"));
+    assert!(fitted(&rounded, &[]).0.contains("a is rounded to 0.25"));
+    assert!(
+        fitted(&day, &[])
+            .0
+            .contains("the level keeps a direction for many rows")
+    );
+    let found = fitted(&back, &[]).0;
+    assert!(
+        found.contains("the level returns to a mean") && !fitted(&rounded, &[]).0.contains("returns"),
+        "{found}"
+    );
+}

@@ -1,6 +1,7 @@
 //! A centre and its sensors as processes.
 
-use super::{Running, fewbits, signal, start, text, wait_for};
+use super::{Running, fewbits, good, signal, start, text, wait_for};
+use crate::numbers::Numbers;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::UdpSocket;
 use std::path::Path;
@@ -445,6 +446,120 @@ fn fleet_begins_with_one_command() {
     assert!(rows.iter().any(both) && rows.iter().all(|row| row["sensors"][1]["number"] == 3));
     let summary = parsed(said.last().unwrap());
     assert!(summary["envelopes"]["unknown"].as_u64().unwrap() > 0, "{said:?}");
+}
+
+/// What `fit` found of a table is what a centre supposes of its sensors: gains, offsets of either sign, and a switch.
+#[test]
+fn centre_takes_what_fit_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let numbers = &mut Numbers(11);
+    let (mut level, mut table) = (20.0, "time,right,other,falling,switch\n".to_owned());
+    for row in 0..300 {
+        level += 0.5 * numbers.normal() - 0.05 * (level - 20.0);
+        let mut noise = |size: f64| size * numbers.normal();
+        let (right, other, falling) =
+            (level + noise(0.1), 1.2 * level - 3.0 + noise(0.2), 100.0 - 2.0 * level + noise(0.4));
+        table += &format!("{row},{right:.3},{other:.3},{falling:.3},{}\n", u8::from(level + noise(0.1) > 19.0));
+    }
+    std::fs::create_dir(folder.path().join("fleet")).unwrap();
+    let fit = "fit - --reference right --bits switch --find gain,time-constant -o fleet/found.json";
+    good(folder.path(), &fit.split(' ').collect::<Vec<_>>(), table.as_bytes());
+    let init = "centre fleet/centre.toml --init --settings fleet/found.json";
+    good(folder.path(), &init.split(' ').collect::<Vec<_>>(), b"");
+    let place = free_place();
+    let edit = |file: &str, changes: &[(&str, &str)]| {
+        let path = folder.path().join("fleet").join(file);
+        let text = std::fs::read_to_string(&path).unwrap();
+        private(&path, &changes.iter().fold(text, |text, (from, to)| text.replacen(from, to, 1)));
+    };
+    let kinds = ["silent:0.5", "word:3", "value"];
+    let bit = "report = \"bit\"";
+    let reports = kinds.map(|kind| format!("report = \"{kind}\""));
+    let mut changes = vec![("0.0.0.0:7070", place.as_str()), ("period = 1.0", "period = 0.04")];
+    changes.extend(reports.iter().map(|report| (bit, report.as_str())));
+    edit("centre.toml", &changes);
+    good(folder.path(), &["check", "fleet/centre.toml"], b"");
+    // All read a level of 22, each in its own way.
+    let samples = ["22.0\n", "23.4\n", "56.0\n", "1\n"];
+    let sensors: Vec<_> = (1..=4)
+        .zip(samples)
+        .map(|(number, samples)| {
+            let file = format!("sensor-{number}.toml");
+            let report = reports.get(number - 1).map_or(bit, String::as_str);
+            edit(&file, &[("192.168.1.5:7070", &place), (bit, report)]);
+            reading(&folder.path().join("fleet"), &file, samples)
+        })
+        .collect();
+    let mut centre = Running::new(start(folder.path(), &["centre", "fleet/centre.toml", "--slots", MOST_SLOTS]));
+    let near = |lines: &[String]| {
+        let rows = rows(lines.iter().map(String::as_str));
+        rows.iter()
+            .rev()
+            .take(10)
+            .filter(|row| row.1 >= 3 && (row.2 - 22.0).abs() < 0.3)
+            .count()
+            == 10
+    };
+    let lines = lines_until(&mut centre, |lines| near(lines));
+    centre.kill().unwrap();
+    centre.wait().unwrap();
+    for mut sensor in sensors {
+        let _ = sensor.kill();
+        sensor.wait().unwrap();
+    }
+    assert!(near(&lines), "{lines:?}");
+    assert!(
+        !lines
+            .iter()
+            .any(|line| line.contains("excluded") || line.contains("impossible")),
+        "{lines:?}"
+    );
+}
+
+/// Numbers that a sensor of a calibrated centre lacks or has twice.
+#[test]
+fn faults_of_calibrated_sensors_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let found = r#"{"relative_to": "a", "change": 0.1, "time_constant": null, "mean": 0.0, "estimates": [], "refused": [], "log_likelihood": 0.0,
+        "sensors": [{"name": "a", "threshold": null, "noise": 0.5, "bias": 1.0, "gain": 2.0, "slope": 0.0, "walk": 0.0, "delay": 3.0},
+        {"name": "s", "threshold": 4.0, "noise": 0.5, "bias": -4.0, "gain": 1.0, "slope": 0.0, "walk": 0.0, "delay": 0.0}]}"#;
+    std::fs::write(folder.path().join("found.json"), found).unwrap();
+    let checked = |head: &str, sensor: &str| {
+        let text = format!(
+            "listen = \"127.0.0.1:1\"\nperiod = 1\nprior = {{ mean = [0], deviation = [9] }}\n{head}\n[[sensor]]\nnumber = 1\nkey = \"{}\"\n{sensor}\n",
+            key('a')
+        );
+        private(&folder.path().join("centre.toml"), &text);
+        let output = fewbits(folder.path(), &["check", "centre.toml"], b"");
+        text_of(&output)
+    };
+    let (with, without) = ("settings = \"found.json\"", "model = { kind = \"random-walk\", density = 1 }");
+    for (head, sensor, said) in [
+        (with, "name = \"a\"\nreport = \"value\"", "found.json: a is 3 s late, which is not corrected"),
+        (with, "name = \"a\"\nreport = \"value\"", "no fault"),
+        (
+            with,
+            "name = \"b\"\nreport = \"value\"",
+            "name is `b`: expected one of the sensors in `settings`, a, s",
+        ),
+        (with, "report = \"value\"", "expected `deviation`, or `name`"),
+        (
+            with,
+            "name = \"s\"\nreport = \"value\"",
+            "report is `value`: expected `bit` of a sensor with a threshold",
+        ),
+        (without, "name = \"a\"\nreport = \"value\"", "expected `settings`"),
+        (without, "deviation = 1\ngain = 0\nreport = \"bit\"", "gain is 0: expected"),
+        (without, "deviation = 1\ngain = 2\nthreshold = 1\nreport = \"bit\"", "neither `gain` nor `offset`"),
+        ("settings = \"none.json\"", "name = \"a\"\nreport = \"value\"", "none.json"),
+    ] {
+        let found = checked(head, sensor);
+        assert!(found.contains(said), "{said}: {found}");
+    }
+}
+
+fn text_of(output: &std::process::Output) -> String {
+    text(&output.stdout) + &text(&output.stderr)
 }
 
 /// A garbled line is a missing measurement: the sensor goes on, names it, and its exit code shows it.

@@ -79,8 +79,11 @@ pub struct Fit {
     pub jumps: Vec<f64>,
     /// Tests of the sensors of values.
     pub tests: Vec<SensorTest>,
-    /// Correlations between the noises of two sensors, with a reference only.
+    /// Correlations between the noises of two sensors, less what both share with the one to which they are relative.
     pub correlations: Vec<Correlation>,
+    /// Seconds in which the level returns to a mean, if that was not looked for and makes the readings likelier by 9.5 nats: a walk does so once
+    /// in hundreds of tables.
+    pub returns: Option<f64>,
 }
 
 impl Fit {
@@ -203,12 +206,13 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
     }
     let (log_likelihood, residuals) = problem.model.log_likelihood(instants)?;
     let jumps = problem.model.jumps(&problem.readings, &problem.scale);
-    let tests = tests_of_fit::of(&residuals);
-    let correlations = request
-        .reference
-        .map_or(Vec::new(), |reference| tests_of_fit::correlations(instants, &problem.model, reference));
+    let counts: Vec<usize> = problem.readings.by_sensor.iter().map(Vec::len).collect();
+    let tests = tests_of_fit::of(&residuals, &counts);
+    let correlations = tests_of_fit::correlations(instants, &problem.model, relative_to);
+    let model = problem.model.clone();
+    let returns = if request.time_constant { None } else { problem.returns() };
     Ok(Fit {
-        model: problem.model,
+        model,
         posterior,
         relative_to,
         estimates,
@@ -217,6 +221,7 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
         jumps,
         tests,
         correlations,
+        returns,
     })
 }
 

@@ -11,6 +11,8 @@ use nalgebra::{DMatrix, DVector};
 /// A walk cannot be negative, so half of that is as much evidence.
 const WORTH: f64 = 2.0;
 const WORTH_OF_WALK: f64 = 1.35;
+/// The same of a level that returns, if nobody asked: a walk does so by chance, since it stays within the readings.
+const CERTAIN: f64 = 9.5;
 /// The same of a drift beside a walk, or in place of one: a drift of several deviations of the noise that is there loses more than ten by being taken for
 /// a walk.
 const WORTH_BESIDE_WALK: f64 = 6.0;
@@ -145,20 +147,34 @@ impl<'a> Problem<'a> {
         self.log_likelihood(model) - self.free.iter().map(far).sum::<f64>()
     }
 
-    /// Climbs from several changes, each with the delays that fit best. Of a long table all but the last climb is about a part.
+    /// Climbs from several changes, each with the delays that fit best and without. Of a long table all but the last climb is about a part.
     pub(super) fn solve(&mut self) {
         self.is_rough = self.part.is_some();
         let mut starts = Vec::new();
         for guess in &self.starts {
-            let (_, late) = self.with_best_delays(guess.clone(), -FAR_DELAYS..=FAR_DELAYS, 1.0);
+            // Readings that have none beside them say nothing of a delay.
+            let far = FAR_DELAYS.min((0.5 * self.length / self.interval) as i32);
+            let (_, late) = self.with_best_delays(guess.clone(), -far..=far, 1.0);
             for factor in [1e-2, 0.1, 1.0, 3.0, 10.0] {
                 let change = factor * guess.change;
-                let model = LevelModel { change, ..late.clone() };
-                starts.push(self.with_best_delays(model, -DELAYS..=DELAYS, 0.5));
+                let with_change = |model: &LevelModel| LevelModel {
+                    change,
+                    ..model.clone()
+                };
+                starts.push(self.with_best_delays(with_change(&late), -DELAYS..=DELAYS, 0.5));
+                if late != *guess {
+                    let prompt = with_change(guess);
+                    starts.push((self.worth(&prompt), prompt));
+                }
             }
         }
         starts.sort_by(|one, other| other.0.total_cmp(&one.0));
+        // Delays that suit a poor guess of the other parameters may be far off, and no climb comes back.
+        let is_prompt = |model: &LevelModel| model.sensors.iter().all(|one| one.delay.abs() <= self.interval);
+        let prompt = starts.iter().skip(CLIMBS).find(|(_, model)| is_prompt(model)).cloned();
+        let has_prompt = starts.iter().take(CLIMBS).any(|(_, model)| is_prompt(model));
         starts.truncate(CLIMBS);
+        starts.extend(prompt.filter(|_| !has_prompt));
         let mut best: Option<(f64, LevelModel)> = None;
         for (_, start) in starts {
             self.model = start;
@@ -246,10 +262,9 @@ impl<'a> Problem<'a> {
         found
     }
 
-    /// Whether the level returns to its mean.
-    pub(super) fn try_time_constant(&mut self, refused: &mut Vec<Refusal>) {
-        let (before, free) = (self.model.clone(), self.free.clone());
-        let wandering = self.worth(&before);
+    /// Looks for the time in which the level returns to its mean. Returns what the readings are worth then, if it is shorter than they last.
+    fn let_return(&mut self) -> (f64, bool) {
+        let before = self.model.clone();
         self.free.extend([Quantity::TimeConstant, Quantity::Mean]);
         let returning = [0.01, 0.03, 0.1, 0.3].map(|share| LevelModel {
             time_constant: Some(share * self.length),
@@ -257,7 +272,23 @@ impl<'a> Problem<'a> {
         });
         self.take_best(returning.into_iter());
         let found = self.climb_nearly();
-        let is_short = self.model.time_constant.is_some_and(|seconds| seconds < self.length);
+        (found, self.model.time_constant.is_some_and(|seconds| seconds < self.length))
+    }
+
+    /// The time in which the level returns to its mean, if that is certain. What was found before is lost.
+    pub(super) fn returns(&mut self) -> Option<f64> {
+        let wandering = self.worth(&self.model);
+        let (found, is_short) = self.let_return();
+        self.model
+            .time_constant
+            .filter(|_| is_short && found > wandering + CERTAIN)
+    }
+
+    /// Whether the level returns to its mean.
+    pub(super) fn try_time_constant(&mut self, refused: &mut Vec<Refusal>) {
+        let (before, free) = (self.model.clone(), self.free.clone());
+        let wandering = self.worth(&before);
+        let (found, is_short) = self.let_return();
         if !is_short || found < wandering + WORTH {
             self.leave_out(before, free, found);
             refused.push(Refusal {

@@ -3,8 +3,14 @@
 use super::Request;
 use super::model::{LevelModel, SensorModel, Spread};
 use crate::Error;
-use crate::calibration::{Instant, median};
+use crate::calibration::{Instant, Reading, median};
 use fewbits_numerics::error::positive;
+
+/// Delays in intervals between readings: so many are tried in the search, and so many by a line.
+const NEAR_DELAYS: i32 = 48;
+const FARTHEST_DELAYS: i32 = 512;
+/// Values by which these are compared, about.
+const SOME: usize = 1000;
 
 /// Readings by time.
 type Series = [(f64, f64)];
@@ -21,18 +27,13 @@ pub(super) fn starts(
     let middle = level.map_or_else(|| median(numbers(&series[anchor])), |level| level.middle);
     let wide = level.map_or(1.0, |level| level.spread);
     let own = rough(&series[anchor], wide);
-    // Of bits, the level is as often above the threshold as below it.
-    let mut sensors = vec![
-        SensorModel {
-            bias: -middle,
-            ..SensorModel::exact(0.3 * wide)
-        };
-        series.len()
-    ];
+    let mut sensors = vec![SensorModel::exact(0.3 * wide); series.len()];
     let mut ratios = vec![None; series.len()];
     for (sensor, values) in series.iter().enumerate() {
         let model = &mut sensors[sensor];
-        if !values.is_empty() {
+        if values.is_empty() {
+            model.bias = -threshold(instants, sensor, &series[anchor]).unwrap_or(middle);
+        } else {
             let spread = Spread::of(numbers(values)).map_or(wide, |own| own.spread);
             *model = SensorModel::exact(0.7 * rough(values, spread));
             if sensor != anchor && request.gain {
@@ -52,7 +53,7 @@ pub(super) fn starts(
         true => &[None, Some(1.0), Some(-1.0)],
         false => &[None],
     };
-    let with_gains = |sign: &Option<f64>| {
+    let with_gains = |sign: &Option<f64>, delays: &[f64]| {
         let mut model = LevelModel {
             change: 0.3 * own / interval.sqrt(),
             time_constant: None,
@@ -63,8 +64,9 @@ pub(super) fn starts(
             if sensor == anchor || values.is_empty() {
                 continue;
             }
-            let pairs = beside(values, &series[anchor]);
+            let pairs = beside(&earlier(values, delays[sensor]), &series[anchor]);
             let one = &mut model.sensors[sensor];
+            one.delay = delays[sensor];
             if let Some(ratio) = ratios[sensor] {
                 one.gain = sign.map_or_else(|| line(&pairs).unwrap_or(ratio), |sign| sign * ratio);
             }
@@ -72,7 +74,73 @@ pub(super) fn starts(
         }
         model
     };
-    Ok(signs.iter().map(with_gains).collect())
+    let mut delays = vec![vec![0.0; series.len()]];
+    if request.delay {
+        let far = |(sensor, values): (usize, &Vec<(f64, f64)>)| match sensor == anchor {
+            true => 0.0,
+            false => far_delay(values, &series[anchor], interval, request.gain),
+        };
+        delays.push(series.iter().enumerate().map(far).collect());
+        delays.dedup();
+    }
+    Ok(delays
+        .iter()
+        .flat_map(|delays| signs.iter().map(|sign| with_gains(sign, delays)))
+        .collect())
+}
+
+fn earlier(values: &Series, delay: f64) -> Vec<(f64, f64)> {
+    values.iter().map(|one| (one.0 - delay, one.1)).collect()
+}
+
+/// The delay at which a line through the values of another sensor leaves least, if it is beyond what the search tries by itself: [`NEAR_DELAYS`]
+/// intervals. Half of the values must have another one beside them.
+fn far_delay(values: &Series, other: &Series, interval: f64, has_gain: bool) -> f64 {
+    let (Some(first), Some(last)) = (other.first(), other.last()) else {
+        return 0.0;
+    };
+    // Of many values some suffice.
+    let some: Vec<(f64, f64)> = values.iter().step_by(values.len() / SOME + 1).copied().collect();
+    let left = |steps: i32| {
+        let delay = f64::from(steps) * interval;
+        let mut moved = earlier(&some, delay);
+        moved.retain(|one| (first.0..=last.0).contains(&one.0));
+        let pairs = beside(&moved, other);
+        let count = pairs.len() as f64;
+        let mean = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
+        let (level, value) = (mean(&|one| one.0), mean(&|one| one.1));
+        let product = mean(&|one| (one.0 - level) * (one.1 - value));
+        let gain = if has_gain {
+            product / mean(&|one| (one.0 - level).powi(2))
+        } else {
+            1.0
+        };
+        let off = mean(&|one| (one.1 - value - gain * (one.0 - level)).powi(2));
+        (2 * pairs.len() >= some.len() && off.is_finite()).then_some((off, steps))
+    };
+    let found = (-FARTHEST_DELAYS..=FARTHEST_DELAYS).filter_map(left);
+    let best = found
+        .min_by(|one, other| one.0.total_cmp(&other.0))
+        .map_or(0, |best| best.1);
+    if best.abs() > NEAR_DELAYS {
+        f64::from(best) * interval
+    } else {
+        0.0
+    }
+}
+
+/// The threshold above which another sensor's values are as often as a sensor's bits say, whatever the delay.
+fn threshold(instants: &[Instant], sensor: usize, other: &Series) -> Option<f64> {
+    let bits = instants.iter().flat_map(|instant| {
+        let own = instant.values.iter().filter(|one| one.0 == sensor);
+        own.map(|one| (instant.seconds, if one.1 == Reading::bit(true) { 1.0 } else { 0.0 }))
+    });
+    let (mut levels, above): (Vec<f64>, Vec<f64>) = beside(&bits.collect::<Vec<_>>(), other).into_iter().unzip();
+    let below = levels.len() as f64 - above.iter().sum::<f64>();
+    levels.sort_by(f64::total_cmp);
+    levels
+        .get((below as usize).min(levels.len().saturating_sub(1)))
+        .copied()
 }
 
 /// The noise of a sensor if its level did not change, from the median of its steps or their mean size. `wide`: the width of all values.

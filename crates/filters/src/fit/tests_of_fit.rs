@@ -5,8 +5,12 @@ use crate::Error;
 use crate::calibration::Instant;
 use serde::{Deserialize, Serialize};
 
-/// A test fails beyond so many deviations: once in a thousand tests of a right model.
+/// A test fails beyond so many deviations: once in a thousand tests of a right model. The second is of the largest of several.
 const FAILED: f64 = 3.3;
+const FAILED_OF_SEVERAL: f64 = 3.7;
+/// Successive innovations in a sum at first, and sums at least.
+const SUMMED: usize = 4;
+const MIN_SUMS: usize = 8;
 /// Instants from which a correlation is found, at least.
 const MIN_READINGS: usize = 12;
 
@@ -23,15 +27,37 @@ pub struct SensorTest {
     pub size: f64,
     /// Correlation of successive innovations in its deviations: positive if the level moves faster than supposed.
     pub repetition: f64,
+    /// The same of sums of 4, 8, 16 and more successive innovations, whose mean square is that of so many single ones; the farthest of them: positive
+    /// if the level keeps a direction for many values, as in a cycle of a day, negative if it returns. 0 if there are other readings than values.
+    pub persistence: f64,
     /// Number of values beyond five deviations.
     pub wild: usize,
 }
 
 impl SensorTest {
-    /// Whether neither test fails at one in a thousand.
+    /// Whether no test fails at one in a thousand.
     pub fn is_passed(&self) -> bool {
-        self.size.abs() < FAILED && self.repetition.abs() < FAILED
+        self.size.abs() < FAILED && self.repetition.abs() < FAILED && self.persistence.abs() < FAILED_OF_SEVERAL
     }
+
+    /// Whether the level keeps a direction for longer than the model has it.
+    pub fn is_persistent(&self) -> bool {
+        self.persistence >= FAILED_OF_SEVERAL
+    }
+}
+
+/// By how many deviations the mean square of sums of successive numbers differs from that of independent ones, at its farthest.
+fn persistence(scores: &[f64], mean_square: f64) -> f64 {
+    let lengths = std::iter::successors(Some(SUMMED), |length| Some(2 * length));
+    let lengths = lengths.take_while(|length| scores.len() / length >= MIN_SUMS);
+    let off = lengths.map(|length| {
+        let sums = scores.chunks_exact(length).map(|part| part.iter().sum::<f64>().powi(2));
+        let ratio = sums.sum::<f64>() / (scores.len() / length * length) as f64 / mean_square;
+        // The cube root of a mean square is nearly Gaussian (Wilson and Hilferty).
+        let variance = 2.0 / (9.0 * (scores.len() / length) as f64);
+        (ratio.cbrt() - (1.0 - variance)) / variance.sqrt()
+    });
+    off.fold(0.0, |farthest: f64, off| if off.abs() > farthest.abs() { off } else { farthest })
 }
 
 /// The correlation between the noises of two sensors.
@@ -58,11 +84,16 @@ impl LevelModel {
     /// # Errors
     /// As [`log_likelihood`](Self::log_likelihood).
     pub fn tests(&self, instants: &[Instant]) -> Result<Vec<SensorTest>, Error> {
-        Ok(of(&self.log_likelihood(instants)?.1))
+        let residuals = self.log_likelihood(instants)?.1;
+        let mut counts = vec![0; residuals.len()];
+        let readings = instants.iter().flat_map(|instant| &instant.values);
+        readings.for_each(|(sensor, _)| counts[*sensor] += 1);
+        Ok(of(&residuals, &counts))
     }
 }
 
-pub(super) fn of(residuals: &[Vec<f64>]) -> Vec<SensorTest> {
+/// `counts`: the readings of each sensor, those that are no values included.
+pub(super) fn of(residuals: &[Vec<f64>], counts: &[usize]) -> Vec<SensorTest> {
     let one = |(sensor, all): (usize, &Vec<f64>)| {
         let kept: Vec<f64> = all.iter().copied().filter(|score| score.abs() <= 5.0).collect();
         let count = kept.len() as f64;
@@ -74,6 +105,11 @@ pub(super) fn of(residuals: &[Vec<f64>]) -> Vec<SensorTest> {
             mean_square,
             size: (mean_square - 1.0) * (0.5 * count).sqrt(),
             repetition: products / (mean_square.max(f64::MIN_POSITIVE) * (count - 1.0).sqrt()),
+            // Values beside limits are those that the limits left, on one side of the forecast.
+            persistence: match counts[sensor] == all.len() {
+                true => persistence(&kept, mean_square.max(f64::MIN_POSITIVE)),
+                false => 0.0,
+            },
             wild: all.len() - kept.len(),
         })
     };
@@ -110,7 +146,7 @@ impl Off {
     }
 }
 
-/// Correlations of the noises of two sensors beside a reference: of what both are off from its values, less what its own noise, and the level
+/// Correlations of the noises of two sensors beside a third: of what both are off from its values, less what its own noise, and the level
 /// between its values, bring into both.
 pub(super) fn correlations(instants: &[Instant], model: &LevelModel, reference: usize) -> Vec<Correlation> {
     let begin = instants.first().map_or(0.0, |instant| instant.seconds);

@@ -4,6 +4,9 @@ use super::smooth_along;
 use fewbits_core::{Error, Evolution, Gaussian, ScaledNoise};
 use fewbits_numerics::error::refuse;
 
+/// Relative size of what times are rounded by, at most.
+const ROUNDING: f64 = 1e-15;
+
 /// A filtered belief.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Filtered<const D: usize> {
@@ -44,7 +47,9 @@ pub fn smooth<const D: usize>(
     let mut last = 0;
     for (k, one) in filtered.iter().enumerate() {
         last = last.max(k);
-        while last + 1 < filtered.len() && filtered[last + 1].seconds <= one.seconds + lag {
+        // Times in decimals are rounded: what is just so much later counts.
+        let end = one.seconds + lag + ROUNDING * (lag + one.seconds.abs());
+        while last + 1 < filtered.len() && filtered[last + 1].seconds <= end {
             last += 1;
         }
         found.extend(back(world, &filtered[k..=last], 1)?);
@@ -169,6 +174,18 @@ mod tests {
                 assert!((lagged[k].mean()[0] - joint(scales, count).0[k]).abs() < 1e-12, "{k}");
             }
         }
+    }
+
+    /// Defect: 0.1 + 0.2 is less than 0.3 by its rounding, so that a lag of 0.2 s did not reach the row that is so much later.
+    #[test]
+    fn a_lag_reaches_the_row_at_its_end() {
+        let mut rows = filtered([1.0; 5]);
+        for (seconds, row) in [0.7, 0.8, 0.9, 1.0, 1.1].into_iter().zip(&mut rows) {
+            row.seconds = seconds;
+        }
+        let near = smooth(&Walk, &rows, Some(0.2)).unwrap();
+        let beyond = smooth(&Walk, &rows, Some(0.25)).unwrap();
+        assert_eq!(near, beyond);
     }
 
     #[test]

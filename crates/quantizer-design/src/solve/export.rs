@@ -193,7 +193,11 @@ impl Export {
         for (n, sensor) in sensors.iter().enumerate() {
             text += &self.c_encoders(n, sensor);
         }
-        text += "\n/* symbols[n]: the word received from sensor n. A word that is missing is the number 2^bits, if the design has losses. */\n";
+        let order: Vec<String> = sensors.iter().map(|sensor| sensor.sensor.to_string()).collect();
+        text += &format!(
+            "\n/* symbols: the words received from sensors {}, in this order. A word that is missing is the number 2^bits, if the design has losses. */\n",
+            order.join(", ")
+        );
         let symbol = |n: usize| format!("(symbols[{n}] < {0} ? symbols[{n}] : {0})", sensors[n].symbols() - 1);
         let numbers = 0..sensors.len();
         let body = match &self.decoder {
@@ -221,18 +225,18 @@ impl Export {
 
     /// Tables and encoders of one sensor, for samples and, if there is a converter, for its codes.
     fn c_encoders(&self, n: usize, sensor: &SensorDesign) -> String {
-        let (name, count) = (&self.name, sensor.breakpoints.len());
+        let (name, own, count) = (&self.name, sensor.sensor, sensor.breakpoints.len());
         let encoder = |function: &str, kind: &str, argument: &str, edges: &str| {
             let body = if count == 0 {
                 // C has no empty arrays. A sensor behind a useless link may use only one word.
                 format!("    (void){argument};\n    return {};\n", sensor.words[0])
             } else {
                 format!(
-                    "    unsigned cell = 0;\n    while (cell < {count} && {name}_{edges}_{n}[cell] <= {argument})\n        \
-                     ++cell;\n    return {name}_words_{n}[cell];\n"
+                    "    unsigned cell = 0;\n    while (cell < {count} && {name}_{edges}_{own}[cell] <= {argument})\n        \
+                     ++cell;\n    return {name}_words_{own}[cell];\n"
                 )
             };
-            c_function("unsigned", &format!("{name}_{function}_{n}"), &format!("{kind} {argument}"), &body)
+            c_function("unsigned", &format!("{name}_{function}_{own}"), &format!("{kind} {argument}"), &body)
         };
         let words = if count == 0 {
             "one word.".to_owned()
@@ -241,13 +245,13 @@ impl Export {
             format!("words of {} bits. {rule}", sensor.bits)
         };
         let mut text = format!("\n/* Sensor {}: {words} */\n", sensor.sensor);
-        text += &c_array("double", &format!("{name}_breakpoints_{n}"), &sensor.breakpoints);
+        text += &c_array("double", &format!("{name}_breakpoints_{own}"), &sensor.breakpoints);
         if count > 0 {
-            text += &c_array("unsigned short", &format!("{name}_words_{n}"), &sensor.words);
+            text += &c_array("unsigned short", &format!("{name}_words_{own}"), &sensor.words);
         }
         text += &encoder("encode", "double", "sample", "breakpoints");
         if let Some(codes) = &self.codes {
-            text += &c_array("unsigned long", &format!("{name}_thresholds_{n}"), &codes[n]);
+            text += &c_array("unsigned long", &format!("{name}_thresholds_{own}"), &codes[n]);
             text += &encoder("encode_code", "unsigned long", "code", "thresholds");
         }
         text
@@ -258,11 +262,12 @@ impl Export {
     pub fn to_rust(&self) -> String {
         let mut text = String::from("// Quantizers and decoder, designed by fewbits.\n");
         for (n, s) in self.solution.sensors().iter().enumerate() {
+            let own = s.sensor;
             let doc = "Breakpoints; a sample on one belongs to the cell above.";
-            text += &rust_array(doc, &format!("BREAKPOINTS_{n}"), "f64", &s.breakpoints);
-            text += &rust_array("Word of each cell.", &format!("WORDS_{n}"), "u16", &s.words);
+            text += &rust_array(doc, &format!("BREAKPOINTS_{own}"), "f64", &s.breakpoints);
+            text += &rust_array("Word of each cell.", &format!("WORDS_{own}"), "u16", &s.words);
             if let Some(codes) = &self.codes {
-                text += &rust_array("Thresholds in codes.", &format!("THRESHOLDS_{n}"), "u32", &codes[n]);
+                text += &rust_array("Thresholds in codes.", &format!("THRESHOLDS_{own}"), "u32", &codes[n]);
             }
         }
         match &self.decoder {
