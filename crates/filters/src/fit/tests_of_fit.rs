@@ -29,6 +29,7 @@ pub struct SensorTest {
     pub repetition: f64,
     /// The same of sums of 4, 8, 16 and more successive innovations, whose mean square is that of so many single ones; the farthest of them: positive
     /// if the level keeps a direction for many values, as in a cycle of a day, negative if it returns. 0 if there are other readings than values.
+    #[serde(default)]
     pub persistence: f64,
     /// Number of values beyond five deviations.
     pub wild: usize,
