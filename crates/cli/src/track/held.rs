@@ -6,6 +6,7 @@
 //! ```
 //! By chance that share is then at most .06. Repetitions say nothing new: taken for measurements, they make bands too narrow.
 
+use super::constant::Constants;
 use super::instant::Instant;
 use super::marks::Marks;
 use fewbits_numerics::Runs;
@@ -31,6 +32,7 @@ struct Column {
 pub(super) struct Held {
     columns: Vec<Column>,
     marks: Marks,
+    constants: Constants,
 }
 
 /// Longest run of repetitions in values, if they are held.
@@ -71,7 +73,12 @@ impl Held {
             }
         };
         let columns = (0..sensors).map(of).collect();
-        let mut held = Self { columns, marks };
+        let constants = Constants::begin(first.make_contiguous(), sensors);
+        let mut held = Self {
+            columns,
+            marks,
+            constants,
+        };
         first.iter_mut().for_each(|row| held.leave_out(row));
         held
     }
@@ -82,19 +89,25 @@ impl Held {
         all.filter(|(_, column)| column.longest > 0).map(|(sensor, _)| sensor)
     }
 
-    /// What numbers are taken for gaps.
+    /// What numbers are taken for gaps, and which columns are constant.
     pub(super) fn hints(&self, names: &[String]) -> Vec<String> {
-        self.marks.hints(names)
+        let mut lines = self.marks.hints(names);
+        lines.extend(self.constants.hints(names));
+        lines
     }
 
     /// Takes them out of the next row; a repetition as if the sensor had not been asked.
     pub(super) fn leave_out(&mut self, row: &mut Instant) {
         self.marks.leave_out(row);
-        if self.sensors().next().is_none() {
+        if self.sensors().next().is_none() && self.constants.is_empty() {
             return;
         }
         let mut stays = Vec::with_capacity(row.reports.len());
         for (sensor, cell) in &row.reports {
+            if self.constants.repeats(*sensor, *cell) {
+                stays.push(false);
+                continue;
+            }
             let Some(column) = self.columns.get_mut(*sensor).filter(|column| column.longest > 0) else {
                 stays.push(true);
                 continue;

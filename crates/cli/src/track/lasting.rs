@@ -10,8 +10,8 @@
 //! The filter is not the best under such noise; its error is stated as large as it is.
 
 use super::first::values_of;
+use super::groups::{centred, whole};
 use super::instant::Instant;
-use fewbits_filters::calibration::median;
 use nalgebra::{DMatrix, DVector};
 
 /// Rows with values of all sensors from which anything is found.
@@ -27,8 +27,6 @@ const PARTS: usize = 4;
 /// Largest memory, and the share of the first correlation down to which it is found.
 const LARGEST: f64 = 0.995;
 const SMALL: f64 = 0.25;
-/// Differences count at most so many deviations.
-const CLIP: f64 = 4.0;
 /// Most sensors that are compared with each other.
 const GROUP: usize = 16;
 /// Rows over which the level's change is found.
@@ -53,10 +51,7 @@ pub(super) struct Lasting {
 
 /// Finds noise that lasts, if any sensor has it.
 pub(super) fn lasting(rows: &[Instant], sensors: usize) -> Option<Lasting> {
-    let is_whole = |row: &&Instant| {
-        row.reports.len() == sensors && row.reports.iter().all(|(_, cell)| cell.is_some_and(f64::is_finite))
-    };
-    let whole: Vec<Instant> = rows.iter().filter(is_whole).cloned().collect();
+    let whole = whole(rows, sensors);
     let n = whole.len();
     if sensors < 2 || n < FEWEST || 10 * n < 9 * rows.len() {
         return None;
@@ -122,12 +117,7 @@ fn parts_of(columns: &[Vec<f64>]) -> Option<Vec<Parts>> {
 
 /// Autocovariances of a difference; `None` if it is not the same throughout.
 fn autocovariances(values: &[f64], far: usize) -> Option<Vec<f64>> {
-    let middle = median(values.to_vec());
-    let size = 1.4826 * median(values.iter().map(|value| (value - middle).abs()).collect());
-    let clipped: Vec<f64> = values
-        .iter()
-        .map(|value| (value - middle).clamp(-CLIP * size, CLIP * size))
-        .collect();
+    let clipped = centred(values);
     let mean = clipped.iter().sum::<f64>() / clipped.len() as f64;
     let off: Vec<f64> = clipped.iter().map(|value| value - mean).collect();
     let square = |part: &[f64]| part.iter().map(|one| one * one).sum::<f64>();
