@@ -22,10 +22,20 @@ const WANDERS: f64 = 6.0;
 /// Differences count at most so many deviations.
 const CLIP: f64 = 4.0;
 
-/// The rows that have a finite value of every sensor.
-pub(super) fn whole(rows: &[Instant], sensors: usize) -> Vec<Instant> {
+/// The sensors that have a value in any row.
+pub(super) fn present(rows: &[Instant], sensors: usize) -> Vec<usize> {
+    let mut has = vec![false; sensors];
+    for (sensor, cell) in rows.iter().flat_map(|row| &row.reports) {
+        has[*sensor] |= cell.is_some_and(f64::is_finite);
+    }
+    (0..sensors).filter(|sensor| has[*sensor]).collect()
+}
+
+/// The rows that have a finite value of each of these sensors.
+pub(super) fn whole(rows: &[Instant], present: &[usize]) -> Vec<Instant> {
     let is_whole = |row: &&Instant| {
-        row.reports.len() == sensors && row.reports.iter().all(|(_, cell)| cell.is_some_and(f64::is_finite))
+        let finite = row.reports.iter().filter(|(_, cell)| cell.is_some_and(f64::is_finite));
+        finite.count() == present.len()
     };
     rows.iter().filter(is_whole).cloned().collect()
 }
@@ -58,12 +68,12 @@ fn wanders(difference: &[f64]) -> bool {
 
 /// A line if there are groups of two and more.
 pub(super) fn groups(rows: &[Instant], names: &[String]) -> Option<String> {
-    let sensors = names.len();
-    let whole = whole(rows, sensors);
+    let present = present(rows, names.len());
+    let (sensors, whole) = (present.len(), whole(rows, &present));
     if !(3..=MOST).contains(&sensors) || whole.len() < FEWEST {
         return None;
     }
-    let columns: Vec<Vec<f64>> = (0..sensors).map(|sensor| values_of(&whole, sensor)).collect();
+    let columns: Vec<Vec<f64>> = present.iter().map(|sensor| values_of(&whole, *sensor)).collect();
     let difference = |one: usize, other: usize| -> Vec<f64> {
         let pairs = columns[one].iter().zip(&columns[other]);
         pairs.map(|(one, other)| one - other).collect()
@@ -90,7 +100,7 @@ pub(super) fn groups(rows: &[Instant], names: &[String]) -> Option<String> {
     let listed = |members: &Vec<usize>| {
         let all: Vec<String> = members
             .iter()
-            .map(|sensor| say::name(&names[*sensor]).into_owned())
+            .map(|sensor| say::name(&names[present[*sensor]]).into_owned())
             .collect();
         all.join(", ")
     };
@@ -99,10 +109,15 @@ pub(super) fn groups(rows: &[Instant], names: &[String]) -> Option<String> {
         "{} agree with each other, but not with the other group: {} is above {} by {} in the first half of the rows and by {} in the second; they measure \
          different levels, and the estimate is of neither: choose one group, as --columns {}",
         groups.join(" agree with each other, and so do "),
-        say::name(&names[second[0]]),
-        say::name(&names[first[0]]),
+        say::name(&names[present[second[0]]]),
+        say::name(&names[present[first[0]]]),
         short(median(begin.to_vec())),
         short(median(end.to_vec())),
-        as_argument(first.iter().map(|sensor| names[*sensor].as_str()).collect::<Vec<_>>())
+        as_argument(
+            first
+                .iter()
+                .map(|sensor| names[present[*sensor]].as_str())
+                .collect::<Vec<_>>()
+        )
     ))
 }

@@ -7,6 +7,7 @@
 //! By chance that share is then at most .06. Repetitions say nothing new: taken for measurements, they make bands too narrow.
 
 use super::constant::Constants;
+use super::derived::{Derived, derived};
 use super::instant::Instant;
 use super::marks::Marks;
 use fewbits_numerics::Runs;
@@ -33,6 +34,7 @@ pub(super) struct Held {
     columns: Vec<Column>,
     marks: Marks,
     constants: Constants,
+    derived: Vec<Derived>,
 }
 
 /// Longest run of repetitions in values, if they are held.
@@ -73,11 +75,11 @@ impl Held {
             }
         };
         let columns = (0..sensors).map(of).collect();
-        let constants = Constants::begin(first.make_contiguous(), sensors);
         let mut held = Self {
             columns,
             marks,
-            constants,
+            constants: Constants::begin(first.make_contiguous(), sensors),
+            derived: derived(first.make_contiguous(), sensors),
         };
         first.iter_mut().for_each(|row| held.leave_out(row));
         held
@@ -89,22 +91,24 @@ impl Held {
         all.filter(|(_, column)| column.longest > 0).map(|(sensor, _)| sensor)
     }
 
-    /// What numbers are taken for gaps, and which columns are constant.
+    /// What numbers are taken for gaps, and which columns are constant or computed from others.
     pub(super) fn hints(&self, names: &[String]) -> Vec<String> {
         let mut lines = self.marks.hints(names);
         lines.extend(self.constants.hints(names));
+        lines.extend(self.derived.iter().map(|one| one.hint(names)));
         lines
     }
 
     /// Takes them out of the next row; a repetition as if the sensor had not been asked.
     pub(super) fn leave_out(&mut self, row: &mut Instant) {
         self.marks.leave_out(row);
-        if self.sensors().next().is_none() && self.constants.is_empty() {
+        if self.sensors().next().is_none() && self.constants.is_empty() && self.derived.is_empty() {
             return;
         }
         let mut stays = Vec::with_capacity(row.reports.len());
         for (sensor, cell) in &row.reports {
-            if self.constants.repeats(*sensor, *cell) {
+            let is_derived = self.derived.iter().any(|one| one.column() == *sensor);
+            if self.constants.repeats(*sensor, *cell) || is_derived {
                 stays.push(false);
                 continue;
             }

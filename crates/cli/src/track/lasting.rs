@@ -10,7 +10,7 @@
 //! The filter is not the best under such noise; its error is stated as large as it is.
 
 use super::first::values_of;
-use super::groups::{centred, whole};
+use super::groups::{centred, present, whole};
 use super::instant::Instant;
 use nalgebra::{DMatrix, DVector};
 
@@ -51,12 +51,13 @@ pub(super) struct Lasting {
 
 /// Finds noise that lasts, if any sensor has it.
 pub(super) fn lasting(rows: &[Instant], sensors: usize) -> Option<Lasting> {
-    let whole = whole(rows, sensors);
-    let n = whole.len();
+    let present = present(rows, sensors);
+    let whole = whole(rows, &present);
+    let (all, sensors, n) = (sensors, present.len(), whole.len());
     if sensors < 2 || n < FEWEST || 10 * n < 9 * rows.len() {
         return None;
     }
-    let columns: Vec<Vec<f64>> = (0..sensors).map(|sensor| values_of(&whole, sensor)).collect();
+    let columns: Vec<Vec<f64>> = present.iter().map(|sensor| values_of(&whole, *sensor)).collect();
     // Of many sensors each is compared with those of its group.
     let groups = sensors.div_ceil(GROUP);
     let ends: Vec<usize> = (0..=groups).map(|group| group * sensors / groups).collect();
@@ -69,7 +70,12 @@ pub(super) fn lasting(rows: &[Instant], sensors: usize) -> Option<Lasting> {
         return None;
     }
     let change = change(&columns, &parts);
-    Some(Lasting { parts, change })
+    // A sensor without values has any noise.
+    let of = |sensor: usize| parts[present.iter().position(|one| *one == sensor).unwrap_or(0)];
+    Some(Lasting {
+        parts: (0..all).map(of).collect(),
+        change,
+    })
 }
 
 /// The parts of the noise of each sensor, from their differences; `None` if one is not the same throughout.

@@ -16,7 +16,7 @@
 //! | `lasting` | errors that last from row to row |
 //! | `groups`, `lags` | groups of sensors of different levels, sensors that come late |
 //! | `transform` | roots and logarithms of values |
-//! | `stuck`, `held`, `constant` | sensors that repeat one value, columns that hold values or never vary |
+//! | `stuck`, `held`, `constant`, `derived` | sensors that repeat one value, columns that hold values, never vary, or are computed from others |
 //! | `limits`, `marks`, `units` | detection limits, numbers that stand for gaps, changes of the unit |
 //! | `late` | rows that come late |
 //! | `rhythm` | silence in a table of single reports |
@@ -35,6 +35,7 @@ pub(crate) mod applied;
 mod centre;
 mod columns;
 mod constant;
+mod derived;
 mod divisor;
 mod doubts;
 mod estimator;

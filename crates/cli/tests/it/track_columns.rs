@@ -83,6 +83,45 @@ fn columns_that_never_vary_are_no_sensors() {
     }
 }
 
+/// Defect: a mean beside its sensors, and a filtered column beside the raw one, were taken for measurements: bands held .06 of the rows.
+#[test]
+fn columns_that_follow_from_others_are_left_out() {
+    let mut filtered = 20.0;
+    let kinds: [(&str, &mut dyn FnMut(f64, &mut Numbers) -> String); 3] = [
+        ("a,mean,b", &mut |level, numbers| {
+            let [a, b] = [0.3, 0.3].map(|noise| level + noise * numbers.normal());
+            format!("{a:.4},{:.4},{b:.4}", 0.5 * (a + b))
+        }),
+        ("raw,smooth", &mut |level, numbers| {
+            let raw = level + 0.3 * numbers.normal();
+            filtered += 0.3 * (raw - filtered);
+            format!("{raw:.4},{filtered:.4}")
+        }),
+        ("celsius,fahrenheit", &mut |level, numbers| {
+            let value = level + 0.3 * numbers.normal();
+            format!("{value:.4},{:.4}", 32.0 + 1.8 * value)
+        }),
+    ];
+    for (seed, (head, cells)) in kinds.into_iter().enumerate() {
+        let (table, levels) =
+            walk(120 + seed as u64, 0.1, head, |levels, numbers| cells(levels[levels.len() - 1], numbers));
+        let (rows, summary) = tracked_file(&table, &[]);
+        let left_out = head.split(',').nth(1).unwrap();
+        assert!(has_hint(&summary, &format!("{left_out} follows from")), "{summary}");
+        let share = share(&rows, &levels);
+        assert!((0.92..0.98).contains(&share), "{head}: {share}");
+    }
+    // Sensors of small noise follow from nothing.
+    let (table, _) = walk(124, 1.0, "a,b,c", |levels, numbers| {
+        let level = levels[levels.len() - 1];
+        [0.01, 0.01, 0.01]
+            .map(|noise| format!("{:.3}", level + noise * numbers.normal()))
+            .join(",")
+    });
+    let (_, summary) = tracked_file(&table, &[]);
+    assert!(!has_hint(&summary, "follows from"), "{summary}");
+}
+
 /// Two places were told as offsets.
 #[test]
 fn groups_of_different_levels_are_told() {
