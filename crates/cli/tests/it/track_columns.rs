@@ -8,6 +8,9 @@ use serde_json::Value;
 
 const ROWS: usize = 600;
 
+/// The cells of a row, by the level.
+type Cells<'a> = &'a mut dyn FnMut(f64, &mut Numbers) -> String;
+
 /// Levels of a walk about 20, and a table of what `cells` makes of each.
 fn walk(
     seed: u64,
@@ -87,7 +90,7 @@ fn columns_that_never_vary_are_no_sensors() {
 #[test]
 fn columns_that_follow_from_others_are_left_out() {
     let mut filtered = 20.0;
-    let kinds: [(&str, &mut dyn FnMut(f64, &mut Numbers) -> String); 3] = [
+    let kinds: [(&str, Cells<'_>); 3] = [
         ("a,mean,b", &mut |level, numbers| {
             let [a, b] = [0.3, 0.3].map(|noise| level + noise * numbers.normal());
             format!("{a:.4},{:.4},{b:.4}", 0.5 * (a + b))
