@@ -1,9 +1,7 @@
 //! Which columns of a table are sensors, and which qualify their values.
 
-use super::columns::{Kind, Roles};
 use super::instant::Qualifier;
 use crate::error::Error;
-use crate::input::Table;
 use fewbits_table::Side;
 
 /// Places of the columns.
@@ -24,25 +22,31 @@ fn cell(cells: &Cells, place: Option<usize>) -> Option<f64> {
 }
 
 impl OwnColumns {
-    pub(super) fn find(table: &Table, roles: &Roles, kind: &Kind) -> Result<Self, Error> {
+    /// `threshold`, `accuracy`: columns for all sensors; `accuracy_of`: that of a sensor.
+    pub(super) fn find<'a>(
+        (names, file): (&[String], &str),
+        threshold: Option<&String>,
+        accuracy: Option<&String>,
+        accuracy_of: impl Fn(&str) -> Option<&'a String>,
+    ) -> Result<Self, Error> {
         let place = |name: Option<&String>| match name {
             None => Ok(None),
-            Some(name) => match table.names.iter().position(|known| known == name) {
+            Some(name) => match names.iter().position(|known| known == name) {
                 Some(place) => Ok(Some(place)),
                 None => {
-                    let problem = format!("no column `{name}`: there are {}", table.names.join(", "));
-                    Err(Error::content(table.file(), problem))
+                    let problem = format!("no column `{name}`: there are {}", names.join(", "));
+                    Err(Error::content(file, problem))
                 }
             },
         };
-        let threshold = place(kind.threshold.as_ref())?;
+        let threshold = place(threshold)?;
         // Also if no column is left that it would qualify.
-        place(roles.accuracy.as_ref())?;
-        let of = |name: &String| place(roles.accuracy_of(name));
-        let accuracies: Vec<Option<usize>> = table.names.iter().map(of).collect::<Result<_, _>>()?;
+        place(accuracy)?;
+        let of = |name: &String| place(accuracy_of(name));
+        let accuracies: Vec<Option<usize>> = names.iter().map(of).collect::<Result<_, _>>()?;
         let is_sensor = |i: &usize| Some(*i) != threshold && !accuracies.contains(&Some(*i));
         Ok(Self {
-            sensors: (0..table.names.len()).filter(is_sensor).collect(),
+            sensors: (0..names.len()).filter(is_sensor).collect(),
             accuracies,
             threshold,
             strange: [0; 2],

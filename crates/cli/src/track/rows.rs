@@ -77,7 +77,10 @@ impl Instants {
         if let Some(name) = &roles.by {
             table = table.with_labels(name)?;
         }
-        let own = OwnColumns::find(&table, &roles, kind)?;
+        let own =
+            OwnColumns::find((&table.names, table.file()), kind.threshold.as_ref(), roles.accuracy.as_ref(), |name| {
+                roles.accuracy_of(name)
+            })?;
         let sensors: Vec<String> = own.sensors.iter().map(|i| table.names[*i].clone()).collect();
         if roles.by.is_some() && sensors.len() != 1 {
             let names = sensors.join(", ");
