@@ -108,6 +108,8 @@ impl Kind {
 pub(super) struct Roles {
     pub(super) by: Option<String>,
     pub(super) accuracy: Option<String>,
+    /// Names of sensors, and of columns of the accuracies of their values alone.
+    pub(super) own_accuracies: Vec<(String, String)>,
     /// What was found, a line each.
     pub(super) told: Vec<String>,
 }
@@ -124,6 +126,19 @@ pub(super) fn words(name: &str) -> Vec<String> {
     parts.filter(|part| !part.is_empty()).map(str::to_owned).collect()
 }
 
+/// The sensor whose name is that of a column of accuracies without the word that says so, and that column.
+fn accuracy_of(name: &str, all: &[&String]) -> Option<(String, String)> {
+    let own = words(name);
+    let is_said_by = |word: &String| ACCURACIES.contains(&word.as_str()) || ERRORS.contains(&word.as_str());
+    let rests = [(own.last()?, &own[..own.len() - 1]), (own.first()?, &own[1..])];
+    let of = |rest: &[String]| all.iter().find(|other| !rest.is_empty() && words(other) == rest);
+    let mut sensors = rests
+        .iter()
+        .filter(|(word, _)| is_said_by(word))
+        .filter_map(|(_, rest)| of(rest));
+    Some(((*sensors.next()?).clone(), name.to_owned()))
+}
+
 fn holds_words(table: &Table, column: usize) -> bool {
     matches!(table.kind(column), Cells::Words | Cells::Text)
 }
@@ -134,6 +149,7 @@ impl Roles {
         let mut found = Self {
             by: kind.by.clone(),
             accuracy: kind.accuracy.clone(),
+            own_accuracies: Vec::new(),
             told: Vec::new(),
         };
         let is_free = |i: &usize| {
@@ -151,10 +167,21 @@ impl Roles {
                         .iter()
                         .any(|word| word.is_some_and(|word| is_said_by(word)))
             };
-            let those: Vec<&String> = free.iter().filter(is_accuracy).map(|i| &table.names[*i]).collect();
+            let mut those: Vec<&String> = free.iter().filter(is_accuracy).map(|i| &table.names[*i]).collect();
+            let all: Vec<&String> = free.iter().map(|i| &table.names[*i]).collect();
+            let pairs: Vec<(String, String)> = all.iter().filter_map(|name| accuracy_of(name, &all)).collect();
+            if all.len() - pairs.len() > 1 {
+                those.retain(|name| pairs.iter().all(|(_, accuracy)| accuracy != *name));
+                found.told.extend(pairs.iter().map(|(sensor, accuracy)| {
+                    format!(
+                        "{accuracy} is taken for the accuracy of the values of {sensor}; with --columns it is a sensor"
+                    )
+                }));
+                found.own_accuracies = pairs;
+            }
             match those.as_slice() {
                 [] => {}
-                [name] if free.len() > 1 => {
+                [name] if free.len() > 1 && found.own_accuracies.is_empty() => {
                     found.told.push(format!(
                         "{name} is taken for the accuracy of each row's values, as --accuracy-column {} says; with --columns it is a sensor",
                         as_argument([name])
@@ -162,7 +189,7 @@ impl Roles {
                     found.accuracy = Some((*name).clone());
                 }
                 _ => found.told.push(format!(
-                    "{} are taken for sensors: if they are accuracies, choose one sensor by --columns and its --accuracy-column",
+                    "taken for sensors: {}: if they are accuracies, choose one sensor by --columns and its --accuracy-column",
                     those.iter().map(|name| name.as_str()).collect::<Vec<_>>().join(", ")
                 )),
             }
@@ -179,7 +206,7 @@ impl Roles {
             let labels: Vec<&String> = free.iter().filter(is_label).map(|i| &table.names[*i]).collect();
             let values = free
                 .iter()
-                .filter(|i| !holds_words(table, **i) && Some(&table.names[**i]) != found.accuracy.as_ref());
+                .filter(|i| !holds_words(table, **i) && !found.is_accuracy(&table.names[**i]));
             let values = values.filter(|i| !labels.contains(&&table.names[**i])).count();
             if let ([name], 1) = (labels.as_slice(), values) {
                 found.told.push(format!(
@@ -192,13 +219,26 @@ impl Roles {
         found
     }
 
+    /// A column of accuracies, if there is one.
+    pub(super) fn any_accuracy(&self) -> Option<&String> {
+        let own = self.own_accuracies.iter().map(|(_, accuracy)| accuracy);
+        self.accuracy.iter().chain(own).next()
+    }
+
+    /// The column of the accuracies of a sensor's values.
+    pub(super) fn accuracy_of(&self, sensor: &str) -> Option<&String> {
+        let own = self.own_accuracies.iter().find(|(name, _)| name == sensor);
+        own.map(|(_, accuracy)| accuracy).or(self.accuracy.as_ref())
+    }
+
+    fn is_accuracy(&self, name: &str) -> bool {
+        let own = self.own_accuracies.iter().map(|(_, accuracy)| accuracy);
+        self.accuracy.iter().chain(own).any(|accuracy| accuracy == name)
+    }
+
     /// What to do if columns beside each other cannot measure one level, by their names, and no option chooses among them.
     pub(super) fn mixed(&self, table: &Table) -> Option<String> {
-        let own = |name: &&String| {
-            [&self.by, &self.accuracy]
-                .iter()
-                .all(|role| role.as_ref() != Some(*name))
-        };
+        let own = |name: &&String| self.by.as_ref() != Some(*name) && !self.is_accuracy(name);
         let quantity = |name: &String| {
             let words = words(name);
             let mut those = QUANTITIES

@@ -1,10 +1,12 @@
 //! What the values of a table say against the noise that is stated, and against noise that does not last.
 
 use super::first::values_of;
+use super::groups::groups;
 use super::instant::Instant;
+use super::lags::lags;
 use super::lasting::lasting;
 use super::settings::Settings;
-use crate::arguments::Model;
+use crate::arguments::{Model, TrackOptions};
 use crate::numbers::short;
 use crate::report::Report;
 use fewbits_filters::calibration::{Number, median};
@@ -56,8 +58,23 @@ impl Settings {
             .collect()
     }
 
+    /// Looks at the differences of sensors: groups of them that measure different levels, those that come late, and errors that last.
+    pub(super) fn find_differences(&mut self, rows: &[Instant], names: &[String], options: &TrackOptions) {
+        let is_plain =
+            self.world.period.is_none() && self.meaning.silent_within.is_none() && options.table.by.is_none();
+        if is_plain {
+            let noises: Vec<f64> = (0..names.len()).map(|i| self.seat(i, &names[i]).noise).collect();
+            self.hints.extend(groups(rows, names));
+            let change = self.world.change * (self.world.interval / self.world.within).sqrt();
+            self.hints.extend(lags(rows, names, &noises, change));
+        }
+        if options.noise.is_empty() && options.change.is_none() {
+            self.find_lasting(rows, names);
+        }
+    }
+
     /// Finds errors of sensors that last from row to row, and the change and noises under them, as far as they may be found.
-    pub(super) fn find_lasting(&mut self, rows: &[Instant], names: &[String]) {
+    fn find_lasting(&mut self, rows: &[Instant], names: &[String]) {
         let is_plain = |(sensor, name): (usize, &String)| {
             let seat = self.seat(sensor, name);
             seat.sends == Report::Value && !seat.is_stated()

@@ -63,6 +63,13 @@ pub(super) fn steepest(first: &[calibration::Instant], sensors: usize, period: O
     STEEP * median((0..sensors).flat_map(of).collect())
 }
 
+/// Whether a sensor has two values that differ.
+pub(super) fn vary<'a>(first: impl IntoIterator<Item = &'a Instant>) -> bool {
+    let mut of: BTreeMap<usize, f64> = BTreeMap::new();
+    let mut cells = first.into_iter().flat_map(|instant| &instant.reports);
+    cells.any(|(sensor, cell)| cell.is_some_and(|cell| cell.is_finite() && *of.entry(*sensor).or_insert(cell) != cell))
+}
+
 /// Number of values of the sensor with the most of them.
 pub(super) fn values_in<'a>(first: impl IntoIterator<Item = &'a Instant>) -> usize {
     let mut counts: Vec<usize> = Vec::new();

@@ -6,6 +6,8 @@
 //! ```
 //! By chance that share is then at most .06. Repetitions say nothing new: taken for measurements, they make bands too narrow.
 
+use super::constant::Constants;
+use super::derived::{Derived, derived};
 use super::instant::Instant;
 use super::marks::Marks;
 use fewbits_numerics::Runs;
@@ -31,6 +33,8 @@ struct Column {
 pub(super) struct Held {
     columns: Vec<Column>,
     marks: Marks,
+    constants: Constants,
+    derived: Vec<Derived>,
 }
 
 /// Longest run of repetitions in values, if they are held.
@@ -71,7 +75,12 @@ impl Held {
             }
         };
         let columns = (0..sensors).map(of).collect();
-        let mut held = Self { columns, marks };
+        let mut held = Self {
+            columns,
+            marks,
+            constants: Constants::begin(first.make_contiguous(), sensors),
+            derived: derived(first.make_contiguous(), sensors),
+        };
         first.iter_mut().for_each(|row| held.leave_out(row));
         held
     }
@@ -82,19 +91,27 @@ impl Held {
         all.filter(|(_, column)| column.longest > 0).map(|(sensor, _)| sensor)
     }
 
-    /// What numbers are taken for gaps.
+    /// What numbers are taken for gaps, and which columns are constant or computed from others.
     pub(super) fn hints(&self, names: &[String]) -> Vec<String> {
-        self.marks.hints(names)
+        let mut lines = self.marks.hints(names);
+        lines.extend(self.constants.hints(names));
+        lines.extend(self.derived.iter().map(|one| one.hint(names)));
+        lines
     }
 
     /// Takes them out of the next row; a repetition as if the sensor had not been asked.
     pub(super) fn leave_out(&mut self, row: &mut Instant) {
         self.marks.leave_out(row);
-        if self.sensors().next().is_none() {
+        if self.sensors().next().is_none() && self.constants.is_empty() && self.derived.is_empty() {
             return;
         }
         let mut stays = Vec::with_capacity(row.reports.len());
         for (sensor, cell) in &row.reports {
+            let is_derived = self.derived.iter().any(|one| one.column() == *sensor);
+            if self.constants.repeats(*sensor, *cell) || is_derived {
+                stays.push(false);
+                continue;
+            }
             let Some(column) = self.columns.get_mut(*sensor).filter(|column| column.longest > 0) else {
                 stays.push(true);
                 continue;

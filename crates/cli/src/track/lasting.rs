@@ -10,8 +10,8 @@
 //! The filter is not the best under such noise; its error is stated as large as it is.
 
 use super::first::values_of;
+use super::groups::{centred, present, whole};
 use super::instant::Instant;
-use fewbits_filters::calibration::median;
 use nalgebra::{DMatrix, DVector};
 
 /// Rows with values of all sensors from which anything is found.
@@ -27,8 +27,8 @@ const PARTS: usize = 4;
 /// Largest memory, and the share of the first correlation down to which it is found.
 const LARGEST: f64 = 0.995;
 const SMALL: f64 = 0.25;
-/// Differences count at most so many deviations.
-const CLIP: f64 = 4.0;
+/// Most sensors that are compared with each other.
+const GROUP: usize = 16;
 /// Rows over which the level's change is found.
 const LAGS: [usize; 6] = [1, 2, 4, 8, 16, 32];
 
@@ -51,15 +51,36 @@ pub(super) struct Lasting {
 
 /// Finds noise that lasts, if any sensor has it.
 pub(super) fn lasting(rows: &[Instant], sensors: usize) -> Option<Lasting> {
-    let is_whole = |row: &&Instant| {
-        row.reports.len() == sensors && row.reports.iter().all(|(_, cell)| cell.is_some_and(f64::is_finite))
-    };
-    let whole: Vec<Instant> = rows.iter().filter(is_whole).cloned().collect();
-    let n = whole.len();
+    let present = present(rows, sensors);
+    let whole = whole(rows, &present);
+    let (all, sensors, n) = (sensors, present.len(), whole.len());
     if sensors < 2 || n < FEWEST || 10 * n < 9 * rows.len() {
         return None;
     }
-    let columns: Vec<Vec<f64>> = (0..sensors).map(|sensor| values_of(&whole, sensor)).collect();
+    let columns: Vec<Vec<f64>> = present.iter().map(|sensor| values_of(&whole, *sensor)).collect();
+    // Of many sensors each is compared with those of its group.
+    let groups = sensors.div_ceil(GROUP);
+    let ends: Vec<usize> = (0..=groups).map(|group| group * sensors / groups).collect();
+    let parts: Vec<Vec<Parts>> = ends
+        .windows(2)
+        .map(|ends| parts_of(&columns[ends[0]..ends[1]]))
+        .collect::<Option<_>>()?;
+    let parts = parts.concat();
+    if parts.iter().all(|one| one.lasting == 0.0) {
+        return None;
+    }
+    let change = change(&columns, &parts);
+    // A sensor without values has any noise.
+    let of = |sensor: usize| parts[present.iter().position(|one| *one == sensor).unwrap_or(0)];
+    Some(Lasting {
+        parts: (0..all).map(of).collect(),
+        change,
+    })
+}
+
+/// The parts of the noise of each sensor, from their differences; `None` if one is not the same throughout.
+fn parts_of(columns: &[Vec<f64>]) -> Option<Vec<Parts>> {
+    let (sensors, n) = (columns.len(), columns[0].len());
     let far = n / 5;
     let mut sums = vec![vec![0.0; far + 1]; sensors];
     let mut total = vec![0.0; far + 1];
@@ -95,24 +116,14 @@ pub(super) fn lasting(rows: &[Instant], sensors: usize) -> Option<Lasting> {
     // The deviation that chance makes of an autocovariance.
     let shares = if sensors == 2 { 2.0 } else { sensors as f64 - 2.0 };
     let chance = |squares: f64| (squares / n as f64).sqrt() / shares;
-    let parts: Vec<Parts> = (0..sensors)
+    (0..sensors)
         .map(|sensor| parts(&own(sensor), chance(squares[sensor])))
-        .collect::<Option<_>>()?;
-    if parts.iter().all(|one| one.lasting == 0.0) {
-        return None;
-    }
-    let change = change(&columns, &parts);
-    Some(Lasting { parts, change })
+        .collect()
 }
 
 /// Autocovariances of a difference; `None` if it is not the same throughout.
 fn autocovariances(values: &[f64], far: usize) -> Option<Vec<f64>> {
-    let middle = median(values.to_vec());
-    let size = 1.4826 * median(values.iter().map(|value| (value - middle).abs()).collect());
-    let clipped: Vec<f64> = values
-        .iter()
-        .map(|value| (value - middle).clamp(-CLIP * size, CLIP * size))
-        .collect();
+    let clipped = centred(values);
     let mean = clipped.iter().sum::<f64>() / clipped.len() as f64;
     let off: Vec<f64> = clipped.iter().map(|value| value - mean).collect();
     let square = |part: &[f64]| part.iter().map(|one| one * one).sum::<f64>();
@@ -235,12 +246,13 @@ impl ErrorUnderLasting {
 
     /// After an estimate that took a share of each sensor's difference from its forecast. Its variance.
     pub(super) fn update(&mut self, gains: &[f64]) -> f64 {
-        let mut step = DMatrix::identity(self.parts.len() + 1, self.parts.len() + 1);
-        for (i, gain) in gains.iter().enumerate() {
-            step[(0, 0)] -= gain;
-            step[(0, i + 1)] = *gain;
-        }
-        self.covariance = &step * &self.covariance * step.transpose();
+        // The error becomes that of the row `taken`; the lasting parts stay.
+        let kept = 1.0 - gains.iter().sum::<f64>();
+        let taken = DVector::from_iterator(gains.len() + 1, std::iter::once(kept).chain(gains.iter().copied()));
+        let mut with_all = &self.covariance * &taken;
+        with_all[0] = taken.dot(&with_all);
+        self.covariance.set_column(0, &with_all);
+        self.covariance.set_row(0, &with_all.transpose());
         let plain = gains.iter().zip(&self.parts).map(|(gain, one)| gain * gain * one.plain);
         self.covariance[(0, 0)] += plain.sum::<f64>();
         self.covariance[(0, 0)]

@@ -2,7 +2,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `rows`, `columns` | the table as instants, which of its columns are no sensors |
+//! | `rows`, `columns`, `own_columns` | the table as instants, which of its columns are no sensors |
 //! | `sensors` | reports as options and tables have them |
 //! | `centre`, `estimator`, `remote` | the centre of a level, its half of a sensor |
 //! | `meaning` | what the cells of a sensor mean |
@@ -14,8 +14,9 @@
 //! | `doubts` | what the values say against the stated noise |
 //! | `followed` | noise that changes while rows come |
 //! | `lasting` | errors that last from row to row |
+//! | `groups`, `lags` | groups of sensors of different levels, sensors that come late |
 //! | `transform` | roots and logarithms of values |
-//! | `stuck` | sensors that repeat one value |
+//! | `stuck`, `held`, `constant`, `derived` | sensors that repeat one value, columns that hold values, never vary, or are computed from others |
 //! | `limits`, `marks`, `units` | detection limits, numbers that stand for gaps, changes of the unit |
 //! | `late` | rows that come late |
 //! | `rhythm` | silence in a table of single reports |
@@ -33,6 +34,8 @@ mod anchors;
 pub(crate) mod applied;
 mod centre;
 mod columns;
+mod constant;
+mod derived;
 mod divisor;
 mod doubts;
 mod estimator;
@@ -40,9 +43,11 @@ mod first;
 mod fit;
 mod followed;
 mod found;
+mod groups;
 mod held;
 mod hints;
 mod instant;
+mod lags;
 mod lasting;
 mod late;
 mod later;
@@ -54,6 +59,7 @@ mod marks;
 mod meaning;
 mod mistakes;
 mod odometry;
+mod own_columns;
 mod path;
 mod picture;
 mod range_settings;
@@ -94,7 +100,7 @@ pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {
             let instants = Instants::open(&options.table, &Kind::of(options)?)?;
             let mut options = options.clone();
             options.table.by.clone_from(&instants.roles.by);
-            options.accuracy_column.clone_from(&instants.roles.accuracy);
+            options.accuracy_column = instants.roles.any_accuracy().cloned();
             let (options, corrections) = applied::applied(&options, &instants.names)?;
             check_transform(&options)?;
             level::run(&options, instants.corrected(corrections, options.transform))

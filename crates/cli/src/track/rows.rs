@@ -5,6 +5,7 @@ use super::columns::{Finds, Kind, Roles};
 use super::held::Held;
 use super::instant::{Instant, Qualifier, Reports};
 use super::late::Late;
+use super::own_columns::OwnColumns;
 use super::samples::Samples;
 use super::seconds::Seconds;
 use super::transform::Transform;
@@ -17,6 +18,8 @@ use std::collections::VecDeque;
 
 /// Smallest number of seconds that is proposed for rows that come late.
 const LATE: f64 = 60.0;
+/// Seconds by which clocks are set back in autumn.
+const HOUR: f64 = 3600.0;
 
 /// A table as instants.
 pub(super) struct Instants {
@@ -29,17 +32,16 @@ pub(super) struct Instants {
     pub(super) is_filled: bool,
     /// Whether cells may be limits, as `<0.25`.
     pub(super) has_limits: bool,
-    /// Places of the columns that are no sensors: accuracy, threshold.
-    own: [Option<usize>; 2],
+    own: OwnColumns,
     seconds: Seconds,
     last: f64,
+    /// Seconds from the row before to the last.
+    step: f64,
     next_number: i64,
     /// Names of the sensors so far.
     pub(super) names: Vec<String>,
     /// Number of rows that were dropped because they repeat one of the same time.
     pub(super) copies: u64,
-    /// Number of rows whose accuracy is 0 or below, and of those whose accuracy is infinite.
-    strange: [u64; 2],
     /// What is corrected in the values of a sensor.
     corrections: Vec<Correction>,
     transform: Option<Transform>,
@@ -75,24 +77,11 @@ impl Instants {
         if let Some(name) = &roles.by {
             table = table.with_labels(name)?;
         }
-        let place = |name: &Option<String>| match name {
-            None => Ok(None),
-            Some(name) => match table.names.iter().position(|known| known == name) {
-                Some(place) => Ok(Some(place)),
-                None => {
-                    let problem = format!("no column `{name}`: there are {}", table.names.join(", "));
-                    Err(Error::content(table.file(), problem))
-                }
-            },
-        };
-        let own = [place(&roles.accuracy)?, place(&kind.threshold)?];
-        let sensors: Vec<String> = table
-            .names
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| !own.contains(&Some(*i)))
-            .map(|(_, name)| name.clone())
-            .collect();
+        let own =
+            OwnColumns::find((&table.names, table.file()), kind.threshold.as_ref(), roles.accuracy.as_ref(), |name| {
+                roles.accuracy_of(name)
+            })?;
+        let sensors: Vec<String> = own.sensors.iter().map(|i| table.names[*i].clone()).collect();
         if roles.by.is_some() && sensors.len() != 1 {
             let names = sensors.join(", ");
             let expected = "one column of values is expected beside time and --by, name it with --columns";
@@ -122,9 +111,9 @@ impl Instants {
             table,
             base,
             last: 0.0,
+            step: 0.0,
             next_number: 0,
             copies: 0,
-            strange: [0; 2],
             corrections: Vec::new(),
             transform: None,
             before: None,
@@ -157,8 +146,8 @@ impl Instants {
 
     /// What was made of accuracies that are none, and of numbers that stand for gaps, a line each.
     pub(super) fn strange_accuracies(&self) -> Vec<String> {
-        let name = self.roles.accuracy.as_deref().unwrap_or_default();
-        let [unknown, void] = self.strange;
+        let name = self.roles.any_accuracy().map_or("", String::as_str);
+        let [unknown, void] = self.own.strange;
         let mut lines: Vec<String> = self.held.iter().flat_map(|held| held.hints(&self.names)).collect();
         if unknown > 0 {
             lines.push(format!(
@@ -332,22 +321,26 @@ impl Instants {
         let (tick, seconds) = self.seconds.of(tick, may_be_late, row, self.table.file());
         let time = clock::shown(tick, self.base);
         if seconds < self.last && !may_be_late {
-            let problem = format!(
-                "row {row}: time {time} is before that of the row above: sort the rows by time, or say how late rows may be, as --late {}s",
-                self.latest(seconds).ceil().max(LATE)
-            );
+            let above = format!("row {row}: time {time} is before that of the row above");
+            let is_set_back = matches!(self.base, TimeBase::Clock { .. })
+                && (self.last - seconds + self.step - HOUR).abs() <= 0.5 * self.step.min(HOUR);
+            let problem = if is_set_back {
+                format!(
+                    "{above}: if the clock was set back by an hour, as in autumn, write times with their difference from UTC, as 2026-10-25T02:00:00+01:00; \
+                     --late would mix the rows of both hours"
+                )
+            } else {
+                let late = self.latest(seconds).ceil().max(LATE);
+                format!("{above}: sort the rows by time, or say how late rows may be, as --late {late}s")
+            };
             return Err(Error::content(self.file(), problem));
         }
+        self.step = seconds - self.last;
         self.last = seconds;
-        let own = self.own.map(|place| cells.get(place?).copied().flatten());
-        let [accuracy, threshold] = own;
-        // What an infinite accuracy says is nothing. Zero and below are marks of devices that do not know theirs.
-        let is_void = accuracy == Some(f64::INFINITY);
-        if let Some(accuracy) = accuracy.filter(|accuracy| *accuracy <= 0.0 || !accuracy.is_finite()) {
-            self.strange[usize::from(accuracy > 0.0)] += 1;
-        }
-        let places: Vec<usize> = (0..cells.len()).filter(|i| !self.own.contains(&Some(*i))).collect();
-        let cells = places.iter().map(|i| (*i, cells[*i].filter(|_| !is_void)));
+        let limit = |place: usize| self.table.limit(place).filter(|_| self.has_limits);
+        let qualifier = |place: &usize| self.own.qualifier(*place, &cells, limit(*place));
+        let qualifiers = self.own.sensors.iter().map(qualifier).collect();
+        let cells = self.own.values(&cells).into_iter();
         let mut reports: Reports = if self.is_long {
             let label = self.table.label();
             let known = self.names.iter().position(|name| name == label);
@@ -364,17 +357,12 @@ impl Instants {
             let wrong = |problem| Error::content(self.file(), format_args!("row {row}: {problem}"));
             transform.apply(&mut reports, &self.names).map_err(wrong)?;
         }
-        let qualifier = |place: &usize| Qualifier {
-            accuracy: accuracy.filter(|accuracy| accuracy.is_finite()),
-            threshold: threshold.filter(|threshold| threshold.is_finite()),
-            limit: self.table.limit(*place).filter(|_| self.has_limits),
-        };
         Ok(Some(Instant {
             seconds,
             time,
             row,
             is_row: true,
-            qualifiers: places.iter().map(qualifier).collect(),
+            qualifiers,
             reports,
         }))
     }

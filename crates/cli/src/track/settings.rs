@@ -1,6 +1,6 @@
 //! Settings of the level and its sensors, from options and first rows.
 
-use super::first::{held_values, values, values_in, values_of};
+use super::first::{held_values, values, values_in, values_of, vary};
 use super::hints::{circle, hints};
 use super::instant::Instant;
 use super::lasting::Lasting;
@@ -17,6 +17,7 @@ use crate::error::Error;
 use crate::numbers::{above_zero, mean_and_deviation, number};
 use crate::report::Report;
 use fewbits_filters::calibration::{median, offsets, shift_deviation};
+use std::collections::VecDeque;
 
 /// Number of rows that are examined before the first estimate.
 const FIRST_ROWS: usize = 200;
@@ -117,13 +118,14 @@ impl Settings {
             rows = (FIRST_REPORTS * instants.names.len()).clamp(rows, MOST_FIRST.max(rows));
         }
         if !known {
-            // Where most cells are empty, so few rows have too few values.
+            // Where most cells are empty or equal, so few rows have too few values.
             let most = if instants.has_samples() {
                 MOST_SAMPLES
             } else {
                 MOST_FIRST
             };
-            while rows < most && instants.peek(rows)?.len() == rows && values_in(instants.peek(rows)?) < FEWEST_VALUES {
+            let is_enough = |first: &VecDeque<Instant>| values_in(first) >= FEWEST_VALUES && vary(first);
+            while rows < most && instants.peek(rows)?.len() == rows && !is_enough(instants.peek(rows)?) {
                 rows = (2 * rows).min(most);
             }
         }
@@ -285,10 +287,8 @@ impl Settings {
         settings.world.change = asked_change.map_or(0.0, |change| change.0);
         settings.noise = asked_noise.unwrap_or(0.0);
         settings.world.prior = asked_prior.unwrap_or((0.0, 0.0));
-        let mut unknown = None;
-        if asked_change.is_none() || asked_noise.is_none() || asked_prior.is_none() {
-            unknown = Some(settings.fit(&first, &instants.names)?);
-        }
+        let is_unknown = asked_change.is_none() || asked_noise.is_none() || asked_prior.is_none();
+        let unknown = is_unknown.then(|| settings.fit(&first, &instants.names)).transpose()?;
         if asked_step.is_none() && options.rounded.as_deref() != Some("no") {
             settings.find_steps(&first, &instants.names);
         }
@@ -317,8 +317,8 @@ impl Settings {
                 }
             }
         }
-        if options.noise.is_empty() && asked_change.is_none() && !options.reports && !instants.has_samples() {
-            settings.find_lasting(&more, &instants.names);
+        if !options.reports && !instants.has_samples() {
+            settings.find_differences(&more, &instants.names, options);
         }
         // Cells have no residual that would tell whether the change is right.
         let has_cells = is_cut

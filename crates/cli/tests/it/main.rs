@@ -30,6 +30,7 @@ mod streams;
 mod tables;
 mod track;
 mod track_bands;
+mod track_columns;
 mod track_faults;
 mod track_found;
 mod track_kinds;

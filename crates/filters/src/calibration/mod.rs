@@ -4,12 +4,14 @@
 //! p(all values | process noise, noise of each sensor) by the Kalman filter of the level, which every sensor measures
 //! each value is wild with probability 1/500, and then anywhere between the smallest and the largest value: it hardly moves the filter
 //! the level jumps with probability 1/1000 at an instant: both beliefs are carried until the readings decide
-//! maximum: first the process noise and one noise of all sensors, then each number by itself, again and again
+//! maximum: first the process noise and one noise of all sensors, then each number by itself, again and again;
+//!          of more than 20 sensors the noise of each from its own readings, given the level that the others say
 //! ```
 //! The density of a value is proper, wild values included. Numbers that are too small are therefore punished by every value that they make
 //! wild. Offsets of sensors are another question: [`offsets`].
 
 mod jumps;
+mod many;
 mod offsets;
 mod on_grid;
 mod reading;
@@ -24,6 +26,7 @@ use crate::{Error, assumed_density};
 use fewbits_core::circle::nearest;
 use fewbits_core::{Evolution, Gaussian, GaussianDynamics};
 use fewbits_numerics::error::{finite, refuse};
+use many::{MANY, Others};
 use nalgebra::SMatrix;
 use search::Search;
 
@@ -68,6 +71,46 @@ pub struct Level<'a, W, const D: usize> {
     pub period: Option<f64>,
 }
 
+/// The belief of the level before a reading, and the probability that the reading is right.
+struct Forecast {
+    mean: f64,
+    variance: f64,
+    right: f64,
+}
+
+/// Adds the square of a distance to the variance of the level.
+fn widen<const D: usize>(belief: &mut Gaussian<D>, distance: f64) {
+    let mut covariance = *belief.covariance();
+    covariance[(0, 0)] += distance * distance;
+    *belief = Gaussian::from_trusted_parts(*belief.mean(), covariance);
+}
+
+/// Dynamics from instant to instant. Most steps are as long as the one before.
+struct Steps<'a, E, const D: usize> {
+    world: &'a E,
+    now: f64,
+    last: Option<(f64, Box<dyn GaussianDynamics<D> + 'a>)>,
+}
+
+impl<'a, E: Evolution<D>, const D: usize> Steps<'a, E, D> {
+    fn new(world: &'a E, now: f64) -> Self {
+        Self { world, now, last: None }
+    }
+
+    /// Dynamics up to the next instant, unless it is at the same time.
+    fn to(&mut self, seconds: f64) -> Result<Option<&dyn GaussianDynamics<D>>, Error> {
+        let length = seconds - self.now;
+        self.now = seconds;
+        if length <= 0.0 {
+            return Ok(None);
+        }
+        if self.last.as_ref().is_none_or(|(last, _)| *last != length) {
+            self.last = Some((length, self.world.over(length)?));
+        }
+        Ok(self.last.as_ref().map(|(_, step)| &**step))
+    }
+}
+
 /// The difference of two angles, at most half a period in size.
 pub fn wrapped(difference: f64, period: Option<f64>) -> f64 {
     period.map_or(difference, |period| nearest(difference, 0.0, period))
@@ -84,16 +127,18 @@ where
     /// If an instant is before the one above it, names a sensor that `noises` does not have, or holds a value that is not finite; if a number
     /// or a guess is not positive; if all values are equal.
     pub fn calibrate(&self, instants: &[Instant], change: Number, noises: &[Number]) -> Result<Calibration, Error> {
-        self.search(instants, change, noises, Self::log_likelihood)
+        self.search(instants, change, noises, Self::log_likelihood, Self::others)
     }
 
-    /// The search by a likelihood of all instants, given the range of the values, the change and the noises.
+    /// The search by a likelihood of all instants, given the range of the values, the change and the noises. `others`: what the other sensors say
+    /// beside each reading, given the same.
     fn search(
         &self,
         instants: &[Instant],
         change: Number,
         noises: &[Number],
         log_likelihood: impl Fn(&Self, &[Instant], f64, f64, &[f64]) -> Option<f64>,
+        others: impl Fn(&Self, &[Instant], f64, f64, &[f64]) -> Option<Others>,
     ) -> Result<Calibration, Error> {
         change.check("change")?;
         noises.iter().try_for_each(|noise| noise.check("noises"))?;
@@ -142,30 +187,56 @@ where
             found.scan();
         }
         found.improve(&[own_change.clone(), together.clone()], &STEPS);
-        let single: Vec<Vec<usize>> = together
-            .iter()
-            .filter(|axis| counts[**axis - 1] >= MIN_READINGS)
-            .map(|axis| vec![*axis])
-            .chain([own_change])
-            .collect();
+        let number = |number: &Number, shift: f64| number.at(shift).unwrap_or(number.start());
+        let numbers = |shifts: &[f64]| -> Vec<f64> {
+            let all = noises.iter().zip(&shifts[1..]);
+            all.map(|(one, shift)| number(one, *shift)).collect()
+        };
+        let others = |shifts: &[f64]| match noises.len() > MANY {
+            true => others(self, instants, range, number(&change, shifts[0]), &numbers(shifts)),
+            false => None,
+        };
+        let mut own: Vec<usize> = together.clone();
+        own.retain(|axis| counts[*axis - 1] >= MIN_READINGS);
+        let single: Vec<Vec<usize>> = own.iter().map(|axis| vec![*axis]).chain([own_change.clone()]).collect();
         for _ in 0..ROUNDS {
             let before = found.best;
-            found.improve(&single, &STEPS[1..]);
+            match others(&found.shifts) {
+                Some(others) => {
+                    let shifts = found.shifts.clone();
+                    for axis in &own {
+                        let mut one = self.one(&others, noises, *axis, range, shifts[*axis]);
+                        one.improve(&[vec![1]], &STEPS[1..]);
+                        found.shifts[*axis] = one.shifts[1];
+                    }
+                    found.best = found.at(&found.shifts);
+                    if found.best < before {
+                        (found.best, found.shifts) = (before, shifts);
+                    }
+                    found.improve(std::slice::from_ref(&own_change), &STEPS[1..]);
+                }
+                None => found.improve(&single, &STEPS[1..]),
+            }
             if found.best - before < 1e-3 {
                 break;
             }
         }
-        for axis in together.iter().chain(change.is_unknown().then_some(&0)) {
-            found.settle(*axis);
+        match others(&found.shifts) {
+            Some(others) => {
+                for axis in &together {
+                    let mut one = self.one(&others, noises, *axis, range, found.shifts[*axis]);
+                    one.settle(1);
+                    found.shifts[*axis] = one.shifts[1];
+                }
+            }
+            None => together.iter().for_each(|axis| found.settle(*axis)),
         }
-        let number = |number: &Number, shift: f64| number.at(shift).unwrap_or(number.start());
+        if change.is_unknown() {
+            found.settle(0);
+        }
         Ok(Calibration {
             change: number(&change, found.shifts[0]),
-            noises: noises
-                .iter()
-                .zip(&found.shifts[1..])
-                .map(|(one, shift)| number(one, *shift))
-                .collect(),
+            noises: numbers(&found.shifts),
             log_likelihood: found.best,
         })
     }
@@ -174,43 +245,34 @@ where
         let world = (self.world)(change).ok()?;
         let mut beliefs = Beliefs::new(*self.prior);
         let mut total = 0.0;
-        let mut now = instants.first()?.seconds;
-        // Most steps are as long as the one before.
-        let mut step: Option<(f64, Box<dyn GaussianDynamics<D> + '_>)> = None;
+        let mut steps = Steps::new(&world, instants.first()?.seconds);
         for instant in instants {
-            let seconds = instant.seconds - now;
-            now = instant.seconds;
-            if seconds > 0.0 {
-                if step.as_ref().is_none_or(|(length, _)| *length != seconds) {
-                    step = Some((seconds, world.over(seconds).ok()?));
-                }
-                if let Some((_, step)) = &step {
-                    let predict = |belief: &mut Gaussian<D>| {
-                        *belief = assumed_density::predict(&**step, belief);
-                        Ok(())
-                    };
-                    beliefs.predict::<()>(predict).ok()?;
-                }
+            if let Some(step) = steps.to(instant.seconds).ok()? {
+                let predict = |belief: &mut Gaussian<D>| {
+                    *belief = assumed_density::predict(step, belief);
+                    Ok(())
+                };
+                beliefs.predict::<()>(predict).ok()?;
             }
-            let update = |belief: &mut Gaussian<D>| self.updated(belief, instant, range, noises).ok_or(());
+            let update = |belief: &mut Gaussian<D>| self.updated(belief, instant, range, noises, |_| ()).ok_or(());
             let widen = |belief: &mut Gaussian<D>, distance: f64| {
-                let mut covariance = *belief.covariance();
-                covariance[(0, 0)] += distance * distance;
-                *belief = Gaussian::from_trusted_parts(*belief.mean(), covariance);
+                widen(belief, distance);
                 Ok(())
             };
-            total += beliefs.update(now, update, widen).ok()?.0;
+            total += beliefs.update(instant.seconds, update, widen).ok()?.0;
         }
         (!total.is_nan()).then_some(total)
     }
 
-    /// Takes in the readings of an instant; `None` if numbers run out of range.
+    /// Takes in the readings of an instant; `None` if numbers run out of range. `each`: the belief of the level before a reading, and the probability
+    /// that it is right.
     fn updated(
         &self,
         belief: &mut Gaussian<D>,
         instant: &Instant,
         range: f64,
         noises: &[f64],
+        mut each: impl FnMut(Forecast),
     ) -> Option<InstantLikelihood> {
         let (mut log_density, mut farthest, mut doubt) = (0.0, 0.0_f64, 0.0_f64);
         for (sensor, reading) in &instant.values {
@@ -218,6 +280,11 @@ where
             let said = reading.said(mean[0], covariance[(0, 0)], noises[*sensor], self.period)?;
             let deviation = said.variance.sqrt();
             let doubted = said.doubted(WILD, reading.wild(WILD, range));
+            each(Forecast {
+                mean: mean[0],
+                variance: covariance[(0, 0)],
+                right: doubted.right,
+            });
             log_density += doubted.density.ln();
             doubt = doubt.max(1.0 - doubted.right);
             farthest = farthest.max((said.score * deviation).abs());

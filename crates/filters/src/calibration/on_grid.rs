@@ -1,9 +1,9 @@
 //! The likelihood of a scalar level that silence cuts again and again: its belief is no Gaussian, and that of the same moments finds other numbers.
 
-use super::{Beliefs, Calibration, Instant, InstantLikelihood, Level, Number, Reading, WILD};
+use super::{Beliefs, Calibration, Instant, InstantLikelihood, Level, Number, Reading, Steps, WILD};
 use crate::Error;
 use crate::moving_grid::{QUICK, mixed, predicted, start, updated};
-use fewbits_core::{Belief, Evolution, Gaussian, GaussianDynamics, Likelihood};
+use fewbits_core::{Belief, Evolution, Gaussian, Likelihood};
 use fewbits_densities::PointMass;
 use nalgebra::Vector1;
 
@@ -77,30 +77,23 @@ where
         change: Number,
         noises: &[Number],
     ) -> Result<Calibration, Error> {
-        self.search(instants, change, noises, |level, instants, range, change, noises| {
+        let log_likelihood = |level: &Self, instants: &[Instant], range: f64, change: f64, noises: &[f64]| {
             level.on_grid(instants, range, change, noises).ok().flatten()
-        })
+        };
+        self.search(instants, change, noises, log_likelihood, |_, _, _, _, _| None)
     }
 
     fn on_grid(&self, instants: &[Instant], range: f64, change: f64, noises: &[f64]) -> Result<Option<f64>, Error> {
         let world = (self.world)(change)?;
         let mut beliefs = Beliefs::new(start(self.prior, &QUICK)?);
         let mut total = 0.0;
-        let mut now = instants.first().map_or(0.0, |instant| instant.seconds);
-        let mut step: Option<(f64, Box<dyn GaussianDynamics<1> + '_>)> = None;
+        let mut steps = Steps::new(&world, instants.first().map_or(0.0, |instant| instant.seconds));
         for instant in instants {
-            let seconds = instant.seconds - now;
-            now = instant.seconds;
-            if seconds > 0.0 {
-                if step.as_ref().is_none_or(|(length, _)| *length != seconds) {
-                    step = Some((seconds, world.over(seconds)?));
-                }
-                if let Some((_, step)) = &step {
-                    beliefs.predict(|belief| {
-                        *belief = predicted(belief, &**step, &QUICK)?;
-                        Ok::<(), Error>(())
-                    })?;
-                }
+            if let Some(step) = steps.to(instant.seconds)? {
+                beliefs.predict(|belief| {
+                    *belief = predicted(belief, step, &QUICK)?;
+                    Ok::<(), Error>(())
+                })?;
             }
             if instant.values.is_empty() {
                 continue;
@@ -111,7 +104,7 @@ where
                 *belief = start(&Gaussian::scalar(level, variance + distance * distance)?, &QUICK)?;
                 Ok(())
             };
-            total += beliefs.update(now, update, widen)?.0;
+            total += beliefs.update(instant.seconds, update, widen)?.0;
         }
         Ok((!total.is_nan()).then_some(total))
     }

@@ -142,12 +142,14 @@ impl<L: Fn(f64, &[f64]) -> f64> Search<'_, L> {
             }
             return;
         }
+        // From the least number of the search to the largest it is twice its reach.
+        let largest = REACH - self.shifts[axis];
         let mut by = 0.0;
-        while by < REACH && self.at(&moved(by + RAISED)) > here - LITTLE {
+        while by + RAISED <= largest && self.at(&moved(by + RAISED)) > here - LITTLE {
             by += RAISED;
         }
         // What no reading depends on stays as it is.
-        if by < REACH {
+        if by + RAISED <= largest {
             self.shifts[axis] += by;
         }
     }

@@ -1,0 +1,75 @@
+//! Columns that have one value while others vary: a sensor that is dead from the start, a set point, a number of the device. They measure no level.
+
+use super::first::values_of;
+use super::instant::Instant;
+use crate::say;
+use fewbits_table::names::as_argument;
+
+/// Values that are all equal, at least, and different values of another column.
+const FEWEST: usize = 30;
+const DIFFERENT: usize = 10;
+
+/// What each column repeats, if it does. A column counts from its first other value on.
+#[derive(Debug)]
+pub(super) struct Constants {
+    of: Vec<Option<f64>>,
+    /// The same, of the first rows.
+    at_first: Vec<Option<f64>>,
+}
+
+impl Constants {
+    /// Of the first rows.
+    pub(super) fn begin(first: &[Instant], sensors: usize) -> Self {
+        let columns: Vec<Vec<f64>> = (0..sensors).map(|sensor| values_of(first, sensor)).collect();
+        let different = |column: &Vec<f64>| {
+            let mut sorted = column.clone();
+            sorted.sort_by(f64::total_cmp);
+            sorted.dedup();
+            sorted.len()
+        };
+        let counts: Vec<usize> = columns.iter().map(different).collect();
+        let vary = counts.iter().any(|count| *count >= DIFFERENT);
+        let of = |(column, count): (&Vec<f64>, &usize)| {
+            let is_constant = vary && *count == 1 && column.len() >= FEWEST;
+            column.first().copied().filter(|_| is_constant)
+        };
+        let of: Vec<Option<f64>> = columns.iter().zip(&counts).map(of).collect();
+        Self {
+            at_first: of.clone(),
+            of,
+        }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.of.iter().all(Option::is_none)
+    }
+
+    /// Whether a cell repeats the value of its column.
+    pub(super) fn repeats(&mut self, sensor: usize, cell: Option<f64>) -> bool {
+        let Some(value) = self.of.get_mut(sensor).filter(|value| value.is_some()) else {
+            return false;
+        };
+        if cell.is_some_and(|cell| Some(cell) != *value) {
+            *value = None;
+        }
+        value.is_some() && cell.is_some()
+    }
+
+    /// A line for each such column.
+    pub(super) fn hints(&self, names: &[String]) -> impl Iterator<Item = String> {
+        let columns = self.at_first.iter().zip(&self.of).zip(names);
+        columns.filter_map(|((at_first, now), name)| {
+            let (value, name) = ((*at_first)?, say::name(name));
+            let until = if now.is_some() {
+                "in all rows"
+            } else {
+                "in all of the first rows"
+            };
+            Some(format!(
+                "{name} is {value} {until}, while others vary: it is left out until it changes, as --without {} does; --noise, --change and --prior \
+                 together keep it",
+                as_argument([&name])
+            ))
+        })
+    }
+}
