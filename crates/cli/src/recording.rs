@@ -2,9 +2,10 @@
 
 use crate::error::Error;
 use crate::files::is_regular;
+use crate::say;
 use crate::target::is_live;
 use crate::waiting::Source;
-use fewbits_record::Playback;
+use fewbits_record::{Column, Playback};
 use std::fs::File;
 use std::io::{Cursor, Read, Seek};
 use std::path::Path;
@@ -43,4 +44,13 @@ pub(crate) fn open(path: &Path) -> Result<Playback<Box<dyn ReadSeek>>, Error> {
     stream.read_to_end(&mut bytes).map_err(Error::io(file, "read"))?;
     let source: Box<dyn ReadSeek> = Box::new(Cursor::new(bytes));
     Playback::new(source).map_err(Error::recording(&name))
+}
+
+/// Refuses another unit than that of a column of a file, if both are known.
+pub(crate) fn same_unit(column: &Column, unit: &str, file: &str) -> Result<(), String> {
+    if unit == column.unit() || unit.is_empty() || column.unit().is_empty() {
+        return Ok(());
+    }
+    let (name, known) = (say::name(column.name()), column.unit());
+    Err(format!("column `{name}` is in {unit}, and in {known} in {file}: convert it, or keep the two apart"))
 }

@@ -3,8 +3,9 @@
 use crate::arguments::CatOptions;
 use crate::error::Error;
 use crate::output::{Cell, Shape, Sheet};
+use crate::recording::same_unit;
 use crate::say::say;
-use crate::unpack::{same_unit, selection, warn_of_end};
+use crate::unpack::{selection, warn_of_end};
 use crate::{Ending, clock, recording};
 use fewbits_recipes::words;
 use fewbits_record::{Aggregate, Schema, Stretch, TimeBase, WholeAggregate};

@@ -5,11 +5,12 @@ use crate::clock::{self, End};
 use crate::error::Error;
 use crate::files::is_regular;
 use crate::output::{Shape, Writer};
+use crate::recording::same_unit;
 use crate::say::{self, say};
 use crate::{Ending, recording};
 use fewbits_recipes::unpack::{self, Selection};
 use fewbits_recipes::{Failure, words};
-use fewbits_record::{Block, BlockReader, Column, Playback, Schema, TimeBase, merged};
+use fewbits_record::{Block, BlockReader, Playback, Schema, TimeBase, merged};
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -185,13 +186,4 @@ pub(crate) fn words_agree<'a>(
         }
     }
     Ok(())
-}
-
-/// Refuses another unit than that of a column of a file, if both are known.
-pub(crate) fn same_unit(column: &Column, unit: &str, file: &str) -> Result<(), String> {
-    if unit == column.unit() || unit.is_empty() || column.unit().is_empty() {
-        return Ok(());
-    }
-    let (name, known) = (say::name(column.name()), column.unit());
-    Err(format!("column `{name}` is in {unit}, and in {known} in {file}: convert it, or keep the two apart"))
 }

@@ -1,6 +1,7 @@
 //! Waiting for what arrives. A signal is the end, as a timeout is: what has arrived is taken before it.
 
-use crate::{interrupt, target};
+use crate::interrupt;
+use crate::target;
 use std::io::{ErrorKind, Read, Result};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};

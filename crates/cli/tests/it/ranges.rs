@@ -376,6 +376,8 @@ fn bits_of_good_anchors_contradict_nothing() {
     for seed in 90..96 {
         assert!(told(seed, None).is_empty(), "{seed}");
     }
-    let bad: Vec<String> = (96..99).flat_map(|seed| told(seed, Some(2))).collect();
-    assert!(!bad.is_empty() && bad.iter().all(|line| line.contains("anchor n2")), "{bad:?}");
+    // Three hundred bits of an anchor are enough in about one table of four.
+    let bad: Vec<Vec<String>> = (96..112).map(|seed| told(seed, Some(2))).collect();
+    assert!(bad.iter().flatten().all(|line| line.contains("anchor n2")), "{bad:?}");
+    assert!(bad.iter().filter(|lines| !lines.is_empty()).count() >= 2, "{bad:?}");
 }

@@ -7,7 +7,7 @@ use crate::{Error, assumed_density};
 use fewbits_core::Evolution;
 
 /// From more sensors on, what the others say of the level hardly depends on the noise of one.
-pub(super) const MANY: usize = 20;
+const MANY: usize = 20;
 /// The level has jumped if so large a share of the readings of an instant is wild, and there are three at least.
 const MOST: f64 = 0.5;
 const FEWEST: usize = 3;
@@ -27,8 +27,11 @@ where
     W: Fn(f64) -> Result<E, Error>,
     E: Evolution<D>,
 {
-    /// What the others say of the level beside each reading.
+    /// What the others say of the level beside each reading; nothing if they are few.
     pub(super) fn others(&self, instants: &[Instant], range: f64, change: f64, noises: &[f64]) -> Option<Others> {
+        if noises.len() <= MANY {
+            return None;
+        }
         let world = (self.world)(change).ok()?;
         let mut belief = *self.prior;
         let mut steps = Steps::new(&world, instants.first()?.seconds);

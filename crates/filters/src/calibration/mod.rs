@@ -26,7 +26,6 @@ use crate::{Error, assumed_density};
 use fewbits_core::circle::nearest;
 use fewbits_core::{Evolution, Gaussian, GaussianDynamics};
 use fewbits_numerics::error::{finite, refuse};
-use many::{MANY, Others};
 use nalgebra::SMatrix;
 use search::Search;
 
@@ -127,18 +126,18 @@ where
     /// If an instant is before the one above it, names a sensor that `noises` does not have, or holds a value that is not finite; if a number
     /// or a guess is not positive; if all values are equal.
     pub fn calibrate(&self, instants: &[Instant], change: Number, noises: &[Number]) -> Result<Calibration, Error> {
-        self.search(instants, change, noises, Self::log_likelihood, Self::others)
+        self.search(instants, change, noises, Self::log_likelihood, true)
     }
 
-    /// The search by a likelihood of all instants, given the range of the values, the change and the noises. `others`: what the other sensors say
-    /// beside each reading, given the same.
+    /// The search by a likelihood of all instants, given the range of the values, the change and the noises. `is_gaussian`: so that each of many
+    /// sensors can be found beside the others.
     fn search(
         &self,
         instants: &[Instant],
         change: Number,
         noises: &[Number],
         log_likelihood: impl Fn(&Self, &[Instant], f64, f64, &[f64]) -> Option<f64>,
-        others: impl Fn(&Self, &[Instant], f64, f64, &[f64]) -> Option<Others>,
+        is_gaussian: bool,
     ) -> Result<Calibration, Error> {
         change.check("change")?;
         noises.iter().try_for_each(|noise| noise.check("noises"))?;
@@ -192,8 +191,8 @@ where
             let all = noises.iter().zip(&shifts[1..]);
             all.map(|(one, shift)| number(one, *shift)).collect()
         };
-        let others = |shifts: &[f64]| match noises.len() > MANY {
-            true => others(self, instants, range, number(&change, shifts[0]), &numbers(shifts)),
+        let others = |shifts: &[f64]| match is_gaussian {
+            true => self.others(instants, range, number(&change, shifts[0]), &numbers(shifts)),
             false => None,
         };
         let mut own: Vec<usize> = together.clone();

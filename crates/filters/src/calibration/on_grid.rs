@@ -80,7 +80,7 @@ where
         let log_likelihood = |level: &Self, instants: &[Instant], range: f64, change: f64, noises: &[f64]| {
             level.on_grid(instants, range, change, noises).ok().flatten()
         };
-        self.search(instants, change, noises, log_likelihood, |_, _, _, _, _| None)
+        self.search(instants, change, noises, log_likelihood, false)
     }
 
     fn on_grid(&self, instants: &[Instant], range: f64, change: f64, noises: &[f64]) -> Result<Option<f64>, Error> {
