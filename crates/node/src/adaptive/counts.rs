@@ -30,11 +30,13 @@ impl Residuals {
     };
 
     /// Counts of the residuals from -64 to 64, and the number of all residuals.
+    #[cfg(any(test, feature = "serde"))]
     pub(crate) fn to_counts(&self) -> (&[u16], u32) {
         (&self.counts, self.total)
     }
 
     /// The inverse of [`to_counts`](Self::to_counts); `None` if the numbers cannot be its result.
+    #[cfg(any(test, feature = "serde"))]
     pub(crate) fn from_counts(counts: &[u16], total: u32) -> Option<Self> {
         let sum: u32 = counts.iter().map(|c| u32::from(*c)).sum();
         let counts = counts.try_into().ok()?;
@@ -130,6 +132,7 @@ impl Values {
     };
 
     /// Indices with their counts, in increasing order.
+    #[cfg(any(test, feature = "serde"))]
     pub(crate) fn iter(&self) -> impl Iterator<Item = (i64, u32)> {
         let index = |entry: u64| (entry >> COUNT_BITS) as i64 + LOWEST;
         self.stored().iter().map(move |entry| (index(*entry), count_of(*entry)))
@@ -137,6 +140,7 @@ impl Values {
 
     /// The inverse of [`iter`](Self::iter). `None` unless there are at most 240 increasing indices with counts above zero and not too
     /// large.
+    #[cfg(any(test, feature = "serde"))]
     pub(crate) fn from_counts(counts: impl IntoIterator<Item = (i64, u32)>) -> Option<Self> {
         let mut values = Self::NONE;
         let mut before = None;

@@ -81,6 +81,7 @@ pub(crate) fn exp_sum(high: f64, low: f64) -> f64 {
 }
 
 /// [`exp`] of `x` with `|x| < 708`, whose result is neither subnormal nor infinite: the same bits in fewer steps.
+#[cfg(feature = "std")]
 #[inline(always)]
 pub(crate) fn exp_normal(x: f64) -> f64 {
     let n = (x * LOG2_E + ROUNDER) - ROUNDER;
