@@ -132,6 +132,9 @@ impl Scale {
                 let Some(own) = numbers.get_mut(*sensor) else {
                     return refuse("sensor", sensor, format!("below {}", sensors.len()));
                 };
+                if let Some(value) = reading.middle().filter(|value| !(value * value).is_finite()) {
+                    return refuse("values", value, "numbers whose squares are finite");
+                }
                 own.extend(reading.middle());
             }
         }

@@ -376,9 +376,14 @@ fn bad_readings_are_refused() {
         )
         .is_err()
     );
-    let mut wrong = rows.clone();
-    wrong[3].values[0].1 = Reading::from(f64::NAN);
-    assert!(fit(&wrong, 1, &Request::default()).is_err());
+    for value in [f64::NAN, f64::INFINITY, -1e200] {
+        let mut wrong = rows.clone();
+        wrong[3].values[0].1 = Reading::from(value);
+        assert!(fit(&wrong, 1, &Request::default()).is_err());
+    }
+    let mut large = rows.clone();
+    large.iter_mut().for_each(|row| row.values[0].1 = Reading::from(1e155));
+    assert!(fit(&large, 1, &Request::default()).is_err());
     let mut wrong = rows;
     wrong.swap(3, 4);
     assert!(fit(&wrong, 1, &Request::default()).is_err());
