@@ -19,6 +19,14 @@ pub(crate) struct Head {
 }
 
 impl Head {
+    /// The lines that are not blank, without the blanks around them.
+    pub(crate) fn filled_lines(&self) -> impl Iterator<Item = &str> {
+        self.lines
+            .iter()
+            .map(|(_, line)| line.trim())
+            .filter(|line| !line.is_empty())
+    }
+
     /// Reads what is there: all of a file's beginning, but of a live source no more than it takes to see rows.
     pub(crate) fn read(reader: &mut dyn BufRead) -> Result<Self, Error> {
         let (mut bytes, mut ended) = (Vec::new(), false);

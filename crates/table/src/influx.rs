@@ -19,8 +19,7 @@ pub(crate) fn pairs(line: &str, number: u64) -> Result<Vec<(String, String)>, Er
 
 /// Whether the first line, comments not counted, is one of the protocol.
 pub(crate) fn is_protocol(head: &Head) -> bool {
-    let mut lines = head.lines.iter().map(|(_, line)| line.trim());
-    let first = lines.find(|line| !line.is_empty() && !line.starts_with('#'));
+    let first = head.filled_lines().find(|line| !line.starts_with('#'));
     first.is_some_and(|line| found(line).is_some())
 }
 
@@ -109,11 +108,7 @@ fn behind_topic(line: &str) -> Option<(&str, &str)> {
 
 /// Whether the first lines are a topic and an object.
 pub(crate) fn has_topics(head: &Head) -> bool {
-    let mut lines = head
-        .lines
-        .iter()
-        .map(|(_, line)| line.trim())
-        .filter(|line| !line.is_empty());
+    let mut lines = head.filled_lines();
     lines.next().is_some_and(|line| behind_topic(line).is_some())
         && lines.next().is_none_or(|line| behind_topic(line).is_some())
 }

@@ -10,12 +10,7 @@ const TIME: &str = "time";
 
 /// Whether the first lines are such lines: nearly all of them, the first two with a name in common, or the only one with two names.
 pub(crate) fn is_labelled(head: &Head) -> bool {
-    let lines: Vec<&str> = head
-        .lines
-        .iter()
-        .map(|(_, line)| line.trim())
-        .filter(|line| !line.is_empty())
-        .collect();
+    let lines: Vec<&str> = head.filled_lines().collect();
     let found: Vec<_> = lines.iter().map(|line| found(line)).collect();
     let (Some(Some(first)), Some(second)) = (found.first(), found.get(1).or(found.first())) else {
         return false;

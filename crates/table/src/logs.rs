@@ -6,12 +6,7 @@ use crate::head::Head;
 
 /// The refusal of NMEA sentences and of lines of a log; `None` if the first lines are neither.
 pub(crate) fn refusal(head: &Head) -> Option<Error> {
-    let lines: Vec<&str> = head
-        .lines
-        .iter()
-        .map(|(_, line)| line.trim())
-        .filter(|line| !line.is_empty())
-        .collect();
+    let lines: Vec<&str> = head.filled_lines().collect();
     let sentences: Vec<&str> = lines.iter().filter_map(|line| sentence(line)).collect();
     if 2 * sentences.len() > lines.len() {
         let has = |kind: &str| sentences.iter().any(|found| found.ends_with(kind));

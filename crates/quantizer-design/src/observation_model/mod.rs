@@ -365,4 +365,25 @@ mod tests {
             assert!(model.moment.weights.iter().sum::<f64>().abs() < 1e-12);
         }
     }
+
+    /// The number of nodes, on which the time of a search depends, does not grow as the noise falls.
+    #[test]
+    fn searches_raise_noise_that_changes_no_design() {
+        let model = |prior: &Prior, noise: f64| {
+            let noise = Noise::independent_with_deviations(&[noise, 2.0]).unwrap();
+            ObservationModel::new(prior.clone(), noise).unwrap()
+        };
+        let normal = Prior::normal(3.0, 10.0).unwrap();
+        let (coarse, fine) = (model(&normal, 0.1), model(&normal, 1e-3));
+        assert!(fine.nodes() > 50 * coarse.nodes());
+        assert_eq!(fine.searched().unwrap(), coarse);
+        assert_eq!(coarse.searched().unwrap(), coarse);
+        // A narrow part of a mixture counts, not the distance of the parts.
+        let narrow = Prior::mixture(&[(0.5, 0.0, 0.05), (0.5, 10.0, 1.0)]).unwrap();
+        let precise = model(&narrow, 1e-3);
+        assert_eq!(precise.searched().unwrap(), precise);
+        // Between points noise of any size may matter.
+        let points = model(&Prior::binary(1.0, 0.5).unwrap(), 1e-3);
+        assert_eq!(points.searched().unwrap(), points);
+    }
 }
