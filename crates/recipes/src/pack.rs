@@ -17,17 +17,16 @@ pub fn fill<W: Write>(
     watch: &mut Watch<'_>,
 ) -> Result<u64, Error> {
     let columns = recorder.schema().columns().len();
-    let (mut rows, mut row) = (0, Vec::with_capacity(columns));
+    let mut rows = 0;
     while let Some(batch) = source.next_batch().map_err(Error::Source)? {
         batch.check(columns)?;
-        for index in 0..batch.rows() {
-            batch.row(index, &mut row);
-            match &batch.ticks {
-                Some(ticks) => recorder.push(ticks[index], &row)?,
-                None => recorder.push_next(&row)?,
-            }
-        }
-        rows += batch.rows() as u64;
+        let ticks = batch.ticks.unwrap_or_else(|| {
+            let first = recorder.next_tick();
+            let rows = batch.columns.first().map_or(0, Vec::len) as i64;
+            (0..rows).map(|row| first.wrapping_add(row)).collect()
+        });
+        recorder.push_columns(&ticks, &batch.columns)?;
+        rows += ticks.len() as u64;
         report(watch, rows)?;
     }
     Ok(rows)

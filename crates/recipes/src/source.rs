@@ -35,12 +35,6 @@ impl Batch {
             None => Ok(()),
         }
     }
-
-    /// The cells of one row, into `row`.
-    pub(crate) fn row(&self, index: usize, row: &mut Vec<Option<f64>>) {
-        row.clear();
-        row.extend(self.columns.iter().map(|column| column[index]));
-    }
 }
 
 /// Where rows come from: a file, a pipe, a table of another program.

@@ -2,6 +2,7 @@
 
 use crate::block::Cells;
 use crate::error::Damage;
+use crate::ranges::wider;
 use crate::wire::Fields;
 
 /// Number, smallest, largest and mean of finite values. Gaps, NaN and infinities are left out.
@@ -47,7 +48,7 @@ impl Aggregate {
         let (mut sum, mut part) = (0.0, 0.0);
         let finite = values.filter(|value| value.is_finite());
         for value in finite {
-            (all.low, all.high) = (all.low.min(value), all.high.max(value));
+            (all.low, all.high) = wider((all.low, all.high), value);
             part += value;
             all.count += 1;
             if all.count % PART == 0 {

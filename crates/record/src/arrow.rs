@@ -268,6 +268,6 @@ impl<W: Write> Recorder<W> {
                 (None, array) => cells(column.name(), array),
             });
         let columns: Vec<Cells> = columns.collect::<Result<_, _>>()?;
-        self.push_all(&ticks, &columns)
+        self.push_columns(&ticks, &columns)
     }
 }

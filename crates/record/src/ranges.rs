@@ -15,8 +15,13 @@ pub(crate) fn with(ends: Ends, cell: Option<f64>) -> Ends {
     match (ends, cell.filter(|value| value.is_finite())) {
         (None, value) => value.map(|value| (value, value)),
         (ends, None) => ends,
-        (Some((low, high)), Some(value)) => Some((value.min(low), value.max(high))),
+        (Some(ends), Some(value)) => Some(wider(ends, value)),
     }
+}
+
+/// The ends including one more number. Comparisons, since `f64::min` is a call in WebAssembly.
+pub(crate) fn wider((low, high): (f64, f64), value: f64) -> (f64, f64) {
+    (if value < low { value } else { low }, if value > high { value } else { high })
 }
 
 /// The ends of each column's finite cells so far.
@@ -28,11 +33,9 @@ impl Ranges {
         Self(vec![None; columns])
     }
 
-    /// Includes one row.
-    pub(crate) fn add(&mut self, row: &[Option<f64>]) {
-        for (ends, cell) in self.0.iter_mut().zip(row) {
-            *ends = with(*ends, *cell);
-        }
+    /// Includes cells of a column.
+    pub(crate) fn add(&mut self, column: usize, cells: &[Option<f64>]) {
+        self.0[column] = cells.iter().fold(self.0[column], |ends, cell| with(ends, *cell));
     }
 
     /// A bound that does not exceed the column's share of the present range; 0 if the range is empty or overflows. `None` for columns

@@ -157,7 +157,7 @@ impl<R: Read + Seek> Playback<R> {
         let mut recorder = Recorder::new(writer, schema).with_effort(effort);
         for block in self.blocks() {
             let block = block?;
-            recorder.push_all(&block.ticks, &block.columns)?;
+            recorder.push_columns(&block.ticks, &block.columns)?;
         }
         recorder.finish()
     }

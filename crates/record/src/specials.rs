@@ -21,7 +21,7 @@ pub(crate) enum Special {
     Whole(u64),
 }
 
-/// The special cells of one column.
+/// The special cells of one column. An empty list means none.
 pub(crate) type Specials = Vec<Option<Special>>;
 
 /// The bits of the usual NaN; they are not stored.
@@ -183,7 +183,15 @@ pub(crate) fn decode(bytes: &[u8], columns: usize, rows: usize) -> Result<Vec<Sp
     Ok(specials)
 }
 
-/// For which rows the codec has a value. An empty list means no special cells.
+/// The special cells of a column before coding.
+pub(crate) fn of(cells: &[Option<f64>]) -> Specials {
+    if cells.iter().all(|cell| cell.is_some_and(f64::is_finite)) {
+        return Specials::new();
+    }
+    cells.iter().map(|cell| Special::of(*cell)).collect()
+}
+
+/// For which rows the codec has a value.
 pub(crate) fn has_value(specials: &[Option<Special>], rows: usize) -> Vec<bool> {
     let mut has_value: Vec<bool> = specials
         .iter()
@@ -193,7 +201,7 @@ pub(crate) fn has_value(specials: &[Option<Special>], rows: usize) -> Vec<bool> 
     has_value
 }
 
-/// The cells of a column: values with the special cells inserted. An empty list means no special cells.
+/// The cells of a column: values with the special cells inserted.
 pub(crate) fn merged(specials: &[Option<Special>], values: &[f64]) -> Vec<Option<f64>> {
     if specials.is_empty() {
         return values.iter().copied().map(Some).collect();

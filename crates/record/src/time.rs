@@ -69,10 +69,18 @@ impl Grid {
         i64::try_from(i128::from(self.origin) + i128::from(self.step) * rows).ok()
     }
 
+    /// The ticks of the rows of a block; `None` if one overflows. If the first and the last do not, none between them does.
+    fn on_grid(&self, block: u64, rows: usize) -> Option<impl Iterator<Item = i64>> {
+        self.tick(block, rows.saturating_sub(1))?;
+        let (first, step) = (self.tick(block, 0)?, self.step);
+        Some((0..rows as i64).map(move |row| first.wrapping_add(step.wrapping_mul(row))))
+    }
+
     /// The ticks of a block that is on the grid.
     pub(crate) fn ticks(&self, block: u64, rows: usize) -> Result<Vec<i64>, Damage> {
-        let tick = |row| self.tick(block, row).ok_or(Damage::Content("ticks"));
-        (0..rows).map(tick).collect()
+        self.on_grid(block, rows)
+            .map(Iterator::collect)
+            .ok_or(Damage::Content("ticks"))
     }
 
     /// The block number, if the ticks are on the grid.
@@ -85,11 +93,9 @@ impl Grid {
         // The nearest one, because the first tick may be off the grid by the tolerance.
         let block = (first + size.abs() / 2 * size.signum()).div_euclid(size);
         let block = u64::try_from(block).ok().filter(|b| i128::from(*b) < MAX_BLOCK)?;
-        let fits = |(row, tick): (usize, &i64)| {
-            self.tick(block, row)
-                .is_some_and(|on_grid| on_grid.abs_diff(*tick) <= self.tolerance)
-        };
-        ticks.iter().enumerate().all(fits).then_some(block)
+        let mut pairs = ticks.iter().zip(self.on_grid(block, ticks.len())?);
+        let fit = pairs.all(|(tick, on_grid)| on_grid.abs_diff(*tick) <= self.tolerance);
+        fit.then_some(block)
     }
 }
 

@@ -24,21 +24,39 @@ impl Waiting {
         }
     }
 
-    /// Adds one row.
+    /// Checks the number of columns, and of the cells of each.
     ///
     /// # Errors
-    /// If the number of cells is not that of the columns. Nothing is added then.
-    pub(crate) fn push(&mut self, tick: i64, row: &[Option<f64>]) -> Result<(), ArgumentError> {
-        if row.len() != self.columns.len() {
-            let expected = format!("{} cells, one per column", self.columns.len());
-            return Err(ArgumentError::new("row", format!("{} cells", row.len()), expected));
+    /// If they are others.
+    pub(crate) fn check(
+        &self,
+        argument: &'static str,
+        lengths: impl ExactSizeIterator<Item = usize>,
+        rows: usize,
+    ) -> Result<(), ArgumentError> {
+        let (found, columns) = (lengths.len(), self.columns.len());
+        if found != columns {
+            let expected = format!("{columns}, one per column");
+            return Err(ArgumentError::new(argument, format!("{found} cells"), expected));
         }
-        self.ticks.push(tick);
-        self.ranges.add(row);
-        for (cells, cell) in self.columns.iter_mut().zip(row) {
-            cells.push(*cell);
+        let mut lengths = lengths;
+        match lengths.find(|length| *length != rows) {
+            Some(length) => Err(ArgumentError::new(
+                argument,
+                format!("a column of {length} cells"),
+                format!("{rows}, one per tick"),
+            )),
+            None => Ok(()),
         }
-        Ok(())
+    }
+
+    /// Adds rows by columns, of each as many cells as ticks.
+    pub(crate) fn extend<'a>(&mut self, ticks: &[i64], columns: impl Iterator<Item = &'a [Option<f64>]>) {
+        self.ticks.extend_from_slice(ticks);
+        for (column, (all, cells)) in self.columns.iter_mut().zip(columns).enumerate() {
+            self.ranges.add(column, cells);
+            all.extend_from_slice(cells);
+        }
     }
 
     /// The first rows as those of the block of this number.

@@ -90,7 +90,7 @@ pub(super) fn encode(
             continue;
         };
         let codec = codec.with_effort(effort);
-        let has_value: Vec<bool> = specials[column].iter().map(Option::is_none).collect();
+        let has_value = specials::has_value(&specials[column], cells[column].len());
         let written = |related: &[usize]| {
             let mut writer = writer.clone();
             let _ = others(&mut writer, column, related);

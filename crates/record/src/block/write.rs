@@ -36,7 +36,7 @@ fn encode_column(
     let column = before.len();
     let target = header.target(column, own);
     let start = header.start(column, own);
-    let mut specials: Specials = cells.iter().map(|cell| Special::of(*cell)).collect();
+    let mut specials = specials::of(cells);
     let shared = may_share
         .then(|| shared::indices(header, column, cells, own, effort))
         .flatten();
@@ -50,7 +50,7 @@ fn encode_column(
             specials,
         };
     }
-    let has_value: Vec<bool> = specials.iter().map(Option::is_none).collect();
+    let has_value = specials::has_value(&specials, cells.len());
     let samples = aligned(cells, &has_value);
     let mut others = related::columns(cells, before, effort);
     let values: Vec<Vec<f64>> = others.iter().map(|i| aligned(&before[*i], &has_value)).collect();
@@ -65,12 +65,15 @@ fn encode_column(
         others.clear();
     }
     // Samples whose restored value is outside the bound are stored in full.
-    let mut values = samples.iter().zip(&coded.restored);
-    for special in specials.iter_mut().filter(|special| special.is_none()) {
-        if let Some((sample, value)) = values.next()
-            && !target.holds(*sample, *value)
-        {
-            *special = Some(Special::Whole(sample.to_bits()));
+    if coded.broken > 0 {
+        specials.resize(cells.len(), None);
+        let mut values = samples.iter().zip(&coded.restored);
+        for special in specials.iter_mut().filter(|special| special.is_none()) {
+            if let Some((sample, value)) = values.next()
+                && !target.holds(*sample, *value)
+            {
+                *special = Some(Special::Whole(sample.to_bits()));
+            }
         }
     }
     let flag = |given: bool, flag: u8| if given { flag } else { 0 };

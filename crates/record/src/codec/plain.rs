@@ -3,6 +3,7 @@
 use super::Target;
 use crate::bound::Bound;
 use crate::error::{Damage, ensure};
+use crate::ranges::wider;
 
 pub(super) fn raw(samples: &[f64]) -> Vec<u8> {
     samples.iter().flat_map(|sample| sample.to_le_bytes()).collect()
@@ -19,9 +20,7 @@ pub(super) fn decode_raw(bytes: &[u8], count: usize) -> Result<Vec<f64>, Damage>
 pub(super) fn constant(samples: &[f64], target: &Target) -> Option<Vec<u8>> {
     let first = *samples.first()?;
     let keeps = |value: f64| samples.iter().all(|sample| target.holds(*sample, value));
-    let ends = samples
-        .iter()
-        .fold((first, first), |(low, high), x| (low.min(*x), high.max(*x)));
+    let ends = samples.iter().fold((first, first), |ends, x| wider(ends, *x));
     let middle = match target.bound {
         Bound::Absolute(delta) if target.period.is_none() && ends.1 - ends.0 <= 2.0 * delta => {
             ends.0 + 0.5 * (ends.1 - ends.0)

@@ -112,7 +112,8 @@ impl FrameWriter {
     /// # Errors
     /// If the number of cells is not that of the columns, or the row does not fit into a frame by itself.
     pub fn push(&mut self, tick: i64, row: &[Option<f64>]) -> Result<Vec<Vec<u8>>, Error> {
-        self.rows.push(tick, row)?;
+        self.rows.check("row", row.iter().map(|_| 1), 1)?;
+        self.rows.extend(&[tick], row.iter().map(std::slice::from_ref));
         self.frames(false)
     }
 

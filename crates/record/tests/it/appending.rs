@@ -120,3 +120,41 @@ fn a_second_writer_is_refused() {
     first.finish().unwrap();
     assert_eq!(read(&path, &truth), 90);
 }
+
+/// Rows by columns give the bytes of the same rows one by one, however they are divided; others are refused as a whole.
+#[test]
+fn rows_by_columns_are_those_one_by_one() {
+    let truth = rows(200);
+    let columns: Vec<Cells> = (0..3).map(|i| truth.iter().map(|row| row[i]).collect()).collect();
+    for (rows_per_block, sizes) in [(64, [1, 63, 64, 65]), (100, [200, 100, 7, 99]), (500, [200, 150, 3, 0])] {
+        let schema = schema(rows_per_block, TimeBase::Numbered);
+        let mut single = Recorder::new(Vec::new(), schema.clone()).with_identity(7);
+        for (tick, row) in (0..).zip(&truth) {
+            single.push(tick * tick % 5 + 3 * tick, row).unwrap();
+        }
+        let (next, expected) = (single.next_tick(), single.finish().unwrap());
+        let ticks: Vec<i64> = (0..200).map(|tick| tick * tick % 5 + 3 * tick).collect();
+        let mut recorder = Recorder::new(Vec::new(), schema).with_identity(7);
+        let mut from = 0;
+        for size in sizes.into_iter().chain([200]) {
+            let to = (from + size).min(200);
+            let part: Vec<&[Option<f64>]> = columns.iter().map(|cells| &cells[from..to]).collect();
+            let bytes = recorder.bytes();
+            assert!(recorder.push_columns(&ticks[from..to], &part[1..]).is_err());
+            let short = [
+                part[0],
+                part[1],
+                &columns[2][..to - from + 1 - 2 * usize::from(to > from)],
+            ];
+            assert!(recorder.push_columns(&ticks[from..to], &short).is_err());
+            assert_eq!(recorder.bytes(), bytes);
+            recorder.push_columns(&ticks[from..to], &part).unwrap();
+            from = to;
+        }
+        assert_eq!(
+            (recorder.next_tick(), recorder.finish().unwrap()),
+            (next, expected),
+            "{rows_per_block} rows a block"
+        );
+    }
+}
