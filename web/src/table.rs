@@ -4,7 +4,7 @@ use crate::known::{self, Found, Known, Pieces, Rows};
 use crate::reading::{self, Said};
 use crate::{text, writing};
 use fewbits_recipes::bounds::{self, Spec};
-use fewbits_recipes::{Batch, pack, plan, verify};
+use fewbits_recipes::{Batch, plan, verify};
 use fewbits_record::{Bound, Column, Playback, Recorder, Schema, TimeBase};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -235,7 +235,14 @@ fn packed(batch: &Batch, schema: Schema, effort: Effort, identity: u32) -> Resul
     };
     let recorder = Recorder::new(Vec::new(), schema);
     let mut recorder = recorder.with_effort(effort).with_identity(identity);
-    let mut go = |_| ControlFlow::Continue(());
-    pack::fill(&mut Pieces::new(batch), &mut recorder, &mut go).map_err(text)?;
+    let numbered: Vec<i64>;
+    let ticks = match &batch.ticks {
+        Some(ticks) => ticks,
+        None => {
+            numbered = (0..batch.rows() as i64).collect();
+            &numbered
+        }
+    };
+    recorder.push_columns(ticks, &batch.columns).map_err(text)?;
     recorder.finish().map_err(text)
 }

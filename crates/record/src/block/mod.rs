@@ -62,8 +62,10 @@ fn plain(header: &Header, apart: bool, column: usize) -> u8 {
 
 /// The cells of another column in the rows in which a column has values; NaN for gaps.
 pub(crate) fn aligned(cells: &[Option<f64>], has_value: &[bool]) -> Vec<f64> {
+    let mut values = Vec::with_capacity(cells.len());
     let kept = cells.iter().zip(has_value).filter(|(_, kept)| **kept);
-    kept.map(|(cell, _)| cell.unwrap_or(f64::NAN)).collect()
+    values.extend(kept.map(|(cell, _)| cell.unwrap_or(f64::NAN)));
+    values
 }
 
 /// Largest length of a block in bytes: twice that of raw samples. Anything longer is not a block.
