@@ -59,8 +59,7 @@ pub struct LeakBelief {
     variance: f64,
 }
 
-/// Number of starts and of rates of the belief.
-const STARTS: usize = 12;
+/// Number of rates of the belief.
 const RATES: usize = 24;
 /// Deviation of a uniform distribution of width 1.
 const UNIFORM: f64 = 0.288_675_134_594_812_9;
@@ -74,11 +73,9 @@ impl LeakBelief {
     /// If starts are not finite or decrease, rates are not positive and increasing, or the error of the model or the share of faults is not in `[0, 1)`.
     pub fn new(field: SensorField, prior: &LeakPrior) -> Result<Self, Error> {
         prior.check()?;
-        let first_last = prior.start;
-        let is_timed = first_last[1] > first_last[0] && !field.is_steady();
-        let starts = if is_timed { STARTS } else { 1 };
-        let width = (first_last[1] - first_last[0]) / starts as f64;
-        let starts: Vec<f64> = (0..starts).map(|i| first_last[0] + (i as f64 + 0.5) * width).collect();
+        let domain = field.domain().clone();
+        let volumes = domain.volumes();
+        let starts = prior.starts(volumes.len(), field.is_steady());
         let step = (prior.rate[1] / prior.rate[0]).ln() / RATES as f64;
         let reach = (2.5 * prior.model_error / step).ceil() as usize;
         let rate = |i: usize| prior.rate[0].ln() + (i as f64 - reach as f64 + 0.5) * step;
@@ -93,8 +90,6 @@ impl LeakBelief {
         let mut gains: Vec<f64> = (0..=2 * reach).map(gain).collect();
         let total: f64 = gains.iter().sum();
         gains.iter_mut().for_each(|gain| *gain /= total);
-        let domain = field.domain().clone();
-        let volumes = domain.volumes();
         let all: f64 = volumes.iter().sum();
         Ok(Self {
             neighbours: field.neighbours(),
@@ -354,6 +349,8 @@ impl LeakBelief {
         for (room, p) in plan.rooms_of(&self.domain)?.into_iter().zip(self.cells()) {
             found[room.unwrap_or(names.len())].1 += p;
         }
+        // Rounding may leave a sum a little above 1.
+        found.iter_mut().for_each(|(_, p)| *p = p.min(1.0));
         found.sort_by(|one, other| other.1.total_cmp(&one.1));
         Ok(found)
     }

@@ -31,7 +31,25 @@ pub enum Reading {
     },
 }
 
+/// Smallest and largest number of starts of a belief, and the number of pairs of a cell and a start above which there are fewer: words of a sensor share
+/// the error of the start, which a belief takes for one of each word.
+const MIN_STARTS: usize = 12;
+const MAX_STARTS: usize = 48;
+const MAX_PAIRS: usize = 1 << 15;
+
 impl LeakPrior {
+    /// The middles of equal parts of the times at which the leak may have begun; one of a steady field.
+    pub(crate) fn starts(&self, cells: usize, is_steady: bool) -> Vec<f64> {
+        let [first, last] = self.start;
+        let count = if last > first && !is_steady {
+            (MAX_PAIRS / cells.max(1)).clamp(MIN_STARTS, MAX_STARTS)
+        } else {
+            1
+        };
+        let width = (last - first) / count as f64;
+        (0..count).map(|i| first + (i as f64 + 0.5) * width).collect()
+    }
+
     pub(crate) fn check(&self) -> Result<(), Error> {
         all_finite("start", &self.start)?;
         if self.start[0] > self.start[1] {

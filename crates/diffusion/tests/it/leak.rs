@@ -1,7 +1,7 @@
 //! A leak in rooms, from readings of a few bits at irregular times. The truth has cells of half the width, another diffusivity and other gains.
 
 use fewbits_diffusion::{Flow, LeakBelief, LeakPrior, Plan, Reading, Scheme, SensorField, StepControl, Transport};
-use fewbits_numerics::normal::quantile;
+use fewbits_numerics::normal::{cdf, quantile};
 
 const PLAN: &str = "
     ##############
@@ -313,4 +313,77 @@ fn many_accurate_values_do_not_name_one_rate_of_the_grid() {
     assert!(p[12] > 0.1 && p[13] > 0.1, "{p:?}");
     assert!((found - mean).abs() < 1e-6 * step, "{found} {mean}");
     assert!((deviation - (variance + step * step / 12.0).sqrt()).abs() < 1e-6 * step, "{deviation}");
+}
+
+/// One cell, words about a leak that may have begun within two hours: mean and deviation of the rate's logarithm are those of the sum over 480
+/// starts and 120 rates. Words of a sensor share where between two starts of the belief the leak began.
+#[test]
+fn words_tell_the_rate_as_a_finer_sum_does() {
+    let domain = Plan::parse("###\n#a#\n###\na = room")
+        .unwrap()
+        .domain(1.0, 1, 0.0)
+        .unwrap();
+    let still = Flow::still(&domain);
+    let transport = Transport::new(domain, 0.02, &still, 1e-3, Scheme::default()).unwrap();
+    let field = SensorField::transient(&transport, &[[1.5, 1.5, 0.0]], &AGES, StepControl::Tolerance(1e-3)).unwrap();
+    let prior = LeakPrior {
+        start: [0.0, 7200.0],
+        rate: [1e-7, 1e-5],
+        model_error: 0.0,
+        faults: 0.0,
+    };
+    let most = response(&field, 0, 0, 4000.0);
+    let (edges, noise) = (vec![3e-7 * most, 1.5e-6 * most, 4e-6 * most], 1e-7 * most);
+    let (mut apart, mut draws) = (Vec::new(), Draws(29));
+    for _ in 0..4 {
+        let (start, rate) = (4000.0 * draws.next(), 1e-7 * 100.0_f64.powf(0.3 + 0.5 * draws.next()));
+        let mut belief = LeakBelief::new(field.clone(), &prior).unwrap();
+        let readings: Vec<(f64, usize)> = (0..60)
+            .map(|_| {
+                let time = 7200.0 * draws.next();
+                let z = rate * response(&field, 0, 0, time - start) + noise * draws.normal();
+                (time, edges.iter().filter(|edge| z >= **edge).count())
+            })
+            .collect();
+        for (time, word) in &readings {
+            let reading = Reading::Word {
+                edges: edges.clone(),
+                word: *word,
+            };
+            belief.observe(0, *time, &reading, noise).unwrap();
+        }
+        let (mut sums, log_step) = ([0.0; 3], f64::ln(100.0) / 120.0);
+        for start in (0..480).map(|i| 15.0 * (f64::from(i) + 0.5)) {
+            let means: Vec<f64> = readings
+                .iter()
+                .map(|(time, _)| response(&field, 0, 0, time - start))
+                .collect();
+            for i in 0..120 {
+                let log = f64::ln(1e-7) + (f64::from(i) + 0.5) * log_step;
+                let below = |edge: f64, mean: f64| cdf((edge - log.exp() * mean) / noise);
+                let p: f64 = readings
+                    .iter()
+                    .zip(&means)
+                    .map(|((_, word), mean)| {
+                        let upper = edges.get(*word).map_or(1.0, |edge| below(*edge, *mean));
+                        upper - word.checked_sub(1).map_or(0.0, |edge| below(edges[edge], *mean))
+                    })
+                    .product();
+                [1.0, log, log * log]
+                    .iter()
+                    .zip(&mut sums)
+                    .for_each(|(x, sum)| *sum += p * x);
+            }
+        }
+        let mean = sums[1] / sums[0];
+        let deviation = (sums[2] / sums[0] - mean * mean).sqrt();
+        let (found, own) = belief.log_rate();
+        apart.push(((found - mean) / own, own / deviation));
+    }
+    assert!(
+        apart
+            .iter()
+            .all(|(off, ratio)| off.abs() < 0.5 && (0.8..2.0).contains(ratio)),
+        "{apart:?}"
+    );
 }
