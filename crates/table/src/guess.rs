@@ -100,14 +100,20 @@ pub(crate) fn goes_back(sample: &[String]) -> bool {
     4 * backward > numbers.len()
 }
 
-/// The offset that a name states, as `Date Time, GMT-07:00` and `Time (UTC +1)`.
+/// The offset that a name states, as `Date Time, GMT-07:00`, `Time (UTC +1)` and `time_utc`.
 pub(crate) fn offset_in(name: &str) -> Option<String> {
-    let at = name.find("GMT").or(name.find("UTC"))?;
+    let words = || name.split(|c: char| !c.is_ascii_alphanumeric());
+    let Some(at) = name.find("GMT").or(name.find("UTC")) else {
+        return words().any(|word| word == "utc").then(|| "UTC".to_owned());
+    };
     let text: String = name[at + 3..]
         .trim_start()
         .chars()
         .take_while(|c| c.is_ascii_digit() || "+-:".contains(*c))
         .collect();
+    if text.is_empty() && words().any(|word| matches!(word, "UTC" | "GMT")) {
+        return Some("UTC".to_owned());
+    }
     civil::offset(&text).map(|_| text)
 }
 

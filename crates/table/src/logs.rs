@@ -24,6 +24,20 @@ pub(crate) fn refusal(head: &Head) -> Option<Error> {
             mend,
         });
     }
+    if are_metrics(&lines) {
+        return Some(Error::Format {
+            what: "metrics in the text format of Prometheus, which are of one moment",
+            mend: "ask its server for a range of time; or of lines with times behind the values: (echo time_ms,value; \
+                   sed -nE 's/^NAME([{].*[}])? ([^ ]+) ([0-9]+)$/\\3,\\2/p' FILE) | fewbits ... -",
+        });
+    }
+    if is_sideways(&lines) {
+        return Some(Error::Format {
+            what: "a table on its side, with a name in front of each line and its values behind",
+            mend: "turn it: python3 -c 'import csv, sys; csv.writer(sys.stdout).writerows(zip(*csv.reader(sys.stdin)))' < FILE | \
+                   fewbits ... -; or say --no-header if each line is a row",
+        });
+    }
     let answers = lines.iter().filter(|line| answer(line).is_some()).count();
     if answers > 0
         && lines
@@ -39,9 +53,47 @@ pub(crate) fn refusal(head: &Head) -> Option<Error> {
 pub(crate) fn sure_refusal(head: &Head) -> Option<Error> {
     let mut lines = head.filled_lines().take(5).peekable();
     lines.peek()?;
+    if are_metrics(&head.filled_lines().collect::<Vec<_>>()) {
+        return refusal(head);
+    }
     lines
         .all(|line| answer(line).is_some() || line.starts_with("AT+") || line == "OK" || logged(line).is_some())
         .then(|| refusal(head))?
+}
+
+/// Whether lines are as `name{label="text"} value time`, with lines `# TYPE name kind` or labels.
+fn are_metrics(lines: &[&str]) -> bool {
+    let is_name = |text: &str| {
+        text.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+            && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == ':')
+    };
+    let is_sample = |line: &&str| {
+        let (name, rest) = line.split_once([' ', '{']).unwrap_or((line, ""));
+        let values = rest.rsplit_once('}').map_or(rest, |(_, values)| values);
+        is_name(name)
+            && values.split_whitespace().count() <= 2
+            && values.split_whitespace().all(|x| x.parse::<f64>().is_ok())
+    };
+    let has_type = lines.iter().any(|line| line.starts_with("# TYPE "));
+    let mut samples = lines.iter().filter(|line| !line.starts_with('#')).peekable();
+    samples.peek().is_some()
+        && samples.all(|line| is_sample(line) && (has_type || line.contains("=\"") && line.contains("} ")))
+}
+
+/// Whether each line is a name and, behind it, as many numbers or times as the others have, more of them than there are lines.
+fn is_sideways(lines: &[&str]) -> bool {
+    [',', ';', '\t'].iter().any(|mark| {
+        let rows: Vec<Vec<&str>> = lines
+            .iter()
+            .map(|line| line.split(*mark).map(str::trim).collect())
+            .collect();
+        let is_value = |cell: &&str| cell.is_empty() || cell.parse::<f64>().is_ok() || guess::looks_like_time(cell);
+        let is_row = |row: &Vec<&str>| {
+            let is_named = row[0].starts_with(|c: char| c.is_alphabetic()) && !guess::looks_like_time(row[0]);
+            row.len() == rows[0].len() && is_named && row[1..].iter().all(is_value)
+        };
+        rows.len() > 1 && rows[0].len() > rows.len().max(4) && rows.iter().all(is_row)
+    })
 }
 
 /// What stands in front of a modem's answer of signal strength, as of `+CSQ: 17,99`.

@@ -1,12 +1,17 @@
 //! What points and commas in numbers mean, by the first rows.
 
-use crate::hint::SPACES;
+use crate::hint::{SPACES, without_unit};
 
 /// Whether numbers have decimal commas without a doubt: a comma before other than three digits, and no decimal points.
 pub(crate) fn has_decimal_commas(rows: &[(u64, Vec<String>)]) -> bool {
     let (mut certain, mut points) = (false, false);
     for cell in rows.iter().flat_map(|(_, cells)| cells) {
         let size = without_exponent(cell.trim_start_matches(['-', '+', '\u{2212}']));
+        // A unit behind the number, as in `20,5 °C` and `40,1 %`.
+        let size = match without_unit(size) {
+            Some((number, unit)) if unit.chars().count() <= 6 && !unit.contains([',', '.', ' ']) => number,
+            _ => size,
+        };
         // Spaces between groups of digits, as of French spreadsheets, say nothing of decimals.
         let is_spaced = |c: char| c == ' ' || SPACES.contains(&c);
         let bare;
