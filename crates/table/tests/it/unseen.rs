@@ -345,6 +345,12 @@ fn numbers_with_units_are_no_words() {
 fn what_is_no_table_of_rows_is_named() {
     let metrics = "# HELP t temperature\n# TYPE t gauge\nt{c=\"a\"} 40 1772323200000\nt{c=\"b\"} 41 1772323200000\n";
     assert!(not_opened(metrics).contains("Prometheus"));
+    for text in [
+        "{\"a\":1,\"rows\":[{\"t\":1,\"v\":2},{\"t\":2,\"v\":3}]}\n",
+        "{\"T\":[{\"ts\":1772323200000,\"value\":\"2\"},{\"ts\":1772323260000,\"value\":\"3\"}]}\n",
+    ] {
+        assert!(not_opened(text).contains("a list of rows"), "{text}");
+    }
     assert!(not_opened("up{job=\"a\"} 1\nup{job=\"b\"} 0\n").contains("Prometheus"));
     for mark in [",", ";", "\t"] {
         let times: Vec<String> = (0..9).map(|i| format!("2026-03-01T{i:02}:00")).collect();
