@@ -225,15 +225,12 @@ pub(crate) fn check_clock(
     };
     // Seconds since 1970, not those of a run or of a day.
     let is_dated = |time: Time| time.seconds() >= 1e8;
+    let has_dates = begin.is_none_or(|tick| is_dated(Time::from_ticks(tick, decimals)));
     let problem = match (scale, times::scale(format)) {
         (own, known) if own == known => return Ok(()),
         (Scale::Seconds, Scale::Utc) if first.is_none_or(is_dated) => return Ok(()),
-        (Scale::Utc, Scale::Seconds) if begin.is_none_or(|tick| is_dated(Time::from_ticks(tick, decimals))) => {
-            return Ok(());
-        }
-        (Scale::Local, known)
-            if known == Scale::Utc || begin.is_none_or(|tick| is_dated(Time::from_ticks(tick, decimals))) =>
-        {
+        (Scale::Utc, Scale::Seconds) if has_dates => return Ok(()),
+        (Scale::Local, known) if known == Scale::Utc || has_dates => {
             "without a zone, and those of {} are UTC: say --time-zone UTC, or their zone"
         }
         (Scale::Local, _) => "dates, and those of {} are seconds: ",

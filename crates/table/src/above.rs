@@ -1,7 +1,5 @@
 //! Names that stand in the lines above the line of names.
 
-use crate::detect::filled;
-
 /// Takes names from the lines above the line of names, the nearest of which is the last.
 ///
 /// 1. If the last line names the columns of an index alone, others are named by the line above.
@@ -61,4 +59,12 @@ pub(crate) fn take_names(
             equal.iter().zip(joined).for_each(|(i, name)| names[*i] = name);
         }
     }
+}
+
+/// Number of cells up to the last that is not empty.
+pub(crate) fn filled(cells: &[String]) -> usize {
+    cells
+        .iter()
+        .rposition(|cell| !cell.is_empty())
+        .map_or(0, |last| last + 1)
 }

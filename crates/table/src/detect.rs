@@ -271,7 +271,7 @@ fn layout(
                 dialect.units_row.get_or_insert(false);
             } else if dialect.units_row.is_none() && dialect.skip_after_names.is_none() {
                 let is_units = header > 0
-                    && filled(&rows[header - 1].1) == filled(&rows[header].1)
+                    && above::filled(&rows[header - 1].1) == above::filled(&rows[header].1)
                     && looks[header - 1].first() != Some(&Look::Number)
                     && !looks[header - 1].contains(&Look::Time)
                     && looks[header - 1].contains(&Look::Text)
@@ -339,7 +339,7 @@ fn layout(
             let mut found = from_header(rows, header, dialect);
             if let Some((_, names)) = &mut found.names {
                 let is_name = |name: &str| look(name, comma) == Look::Text;
-                above::take_names(names, &rows[..header], filled(&rows[data].1), is_name);
+                above::take_names(names, &rows[..header], above::filled(&rows[data].1), is_name);
             }
             Ok(found)
         }
@@ -357,14 +357,6 @@ fn several_tables(line: u64) -> Error {
         problem: "rows of numbers stand above the line of names, as if this were a table before another".to_owned(),
         mend: "make a file of each table; if these are settings, say --skip with the number of lines above the names",
     }
-}
-
-/// Number of cells up to the last that is not empty.
-pub(crate) fn filled(cells: &[String]) -> usize {
-    cells
-        .iter()
-        .rposition(|cell| !cell.is_empty())
-        .map_or(0, |last| last + 1)
 }
 
 fn from_header(rows: &[(u64, Vec<String>)], header: usize, dialect: &mut Dialect) -> Layout {

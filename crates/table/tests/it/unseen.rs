@@ -311,6 +311,8 @@ fn names_that_say_utc_alone_state_it() {
     }
     let table = open(&lines("Time (GMT);v", |i| format!("2026-03-01 {i:02}:00:00;{i}.5")));
     assert_eq!(table.time().map(|time| time.1), Some(Scale::Utc));
+    let table = open(&lines("Local time (not UTC);v", |i| format!("2026-03-01 {i:02}:00:00;{i}.5")));
+    assert_eq!(table.time().map(|time| time.1), Some(Scale::Local));
     let table = open(&lines("outcome;v", |i| format!("2026-03-01 {i:02}:00:00;{i}.5")));
     assert_eq!(table.time().map(|time| time.1), Some(Scale::Local));
 }
