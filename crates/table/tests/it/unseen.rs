@@ -374,3 +374,13 @@ fn the_last_day_of_the_calendar_is_a_date() {
         assert!(shown[1].ends_with(&text[text.len() - 14..]), "{shown:?}");
     }
 }
+
+#[test]
+fn single_quotes_around_delimiters_are_quotes() {
+    let table = open(&lines("time;'a;b';v", |i| format!("{i};'x;y';{i}")));
+    assert_eq!(names(&table), ["a;b", "v"]);
+    let table = open(&lines("time,note,v", |i| format!("{i},'tis,it's {i}")));
+    assert_eq!(names(&table), ["note", "v"]);
+    let mut table = open(&lines("time;v", |i| format!("{i};\u{a0}{i},5\u{a0}")));
+    assert_eq!(numbers(&rows(&mut table).columns[0])[1], Some(1.5));
+}
