@@ -255,7 +255,8 @@ fn codes(numbers: &[Option<i64>], integers: Integers) -> Cells {
 }
 
 pub(crate) fn opened(path: &Path) -> Outcome<Playback<BufReader<File>>> {
-    Ok(Playback::opened(BufReader::new(File::open(path)?), path)?)
+    let named = |error: std::io::Error| std::io::Error::new(error.kind(), format!("{}: {error}", path.display()));
+    Ok(Playback::opened(BufReader::new(File::open(path).map_err(named)?), path)?)
 }
 
 /// Bits per sample that each column would need, at several bounds.

@@ -1,5 +1,6 @@
 //! Errors of the command. Every message says where the error is and what to do.
 
+use crate::say;
 use std::io;
 
 /// Why a model, a sensor, a report or a row was refused.
@@ -25,7 +26,7 @@ pub(crate) enum Error {
         source: fewbits_record::Error,
     },
     /// A column of a recording was refused.
-    #[error("{file}: column `{column}`")]
+    #[error("{file}: column `{}`", say::name(.column))]
     Column {
         file: String,
         column: String,
@@ -55,7 +56,7 @@ pub(crate) enum Error {
     #[error("{file}: no {what}: the first line names the columns, rows follow")]
     Empty { file: String, what: &'static str },
     /// The table has no column of this name.
-    #[error("{file}: no column `{column}`: there are {existing}")]
+    #[error("{file}: no column `{}`: there are {existing}", say::name(.column))]
     NoColumn {
         file: String,
         column: String,

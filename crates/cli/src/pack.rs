@@ -8,7 +8,7 @@ use crate::input::{Survey, Table};
 use crate::live;
 use crate::recording::same_unit;
 use crate::rows::TableRows;
-use crate::say::say;
+use crate::say::{self, say};
 use crate::single_pass::{is_written_beside, readable_once};
 use crate::target::{self, Target};
 use crate::{Ending, bounds, clock};
@@ -125,7 +125,7 @@ fn check_words(table: &Table) -> Result<(), Error> {
     let is_too_long = |i: &usize| table.kind(*i) == Kind::Words && table.unit(*i).is_empty();
     let found: Vec<_> = (0..table.names.len())
         .filter(is_too_long)
-        .map(|i| crate::say::name(&table.names[i]))
+        .map(|i| say::name(&table.names[i]))
         .collect();
     if found.is_empty() {
         return Ok(());
@@ -212,24 +212,33 @@ fn continued(options: &TableOptions, schema: &Schema, file: &str) -> Result<Tabl
     })
 }
 
-/// Refuses times that would be others in the recording. `begin`: its first tick.
-fn check_clock(table: &mut Table, time: TimeBase, begin: Option<i64>, file: &str) -> Result<(), Error> {
+/// Refuses times that are others than those of the recording. `begin`: its first tick. `mend`: what to do if no option helps.
+pub(crate) fn check_clock(
+    table: &mut Table,
+    time: TimeBase,
+    begin: Option<i64>,
+    file: &str,
+    mend: &str,
+) -> Result<(), Error> {
     let (TimeBase::Clock { decimals, format, .. }, Some((scale, first))) = (time, table.first_time()?) else {
         return Ok(());
     };
     // Seconds since 1970, not those of a run or of a day.
     let is_dated = |time: Time| time.seconds() >= 1e8;
+    let has_dates = begin.is_none_or(|tick| is_dated(Time::from_ticks(tick, decimals)));
     let problem = match (scale, times::scale(format)) {
         (own, known) if own == known => return Ok(()),
         (Scale::Seconds, Scale::Utc) if first.is_none_or(is_dated) => return Ok(()),
-        (Scale::Utc, Scale::Seconds) if begin.is_none_or(|tick| is_dated(Time::from_ticks(tick, decimals))) => {
-            return Ok(());
+        (Scale::Utc, Scale::Seconds) if has_dates => return Ok(()),
+        (Scale::Local, known) if known == Scale::Utc || has_dates => {
+            "without a zone, and those of {} are UTC: say --time-zone UTC, or their zone"
         }
-        (Scale::Local, _) => "without a zone, and those of {} are not: say --time-zone UTC, or their zone",
-        (Scale::Utc, _) => "UTC, and those of {} have no zone or date: pack the table into a file of its own",
-        _ => "seconds, and those of {} are dates: pack the table into a file of its own",
+        (Scale::Local, _) => "dates, and those of {} are seconds: ",
+        (Scale::Utc, _) => "UTC, and those of {} have no zone or date: ",
+        _ => "seconds, and those of {} are dates: ",
     };
-    Err(Error::content(table.file(), format!("its times are {}", problem.replace("{}", file))))
+    let mend = if problem.ends_with(' ') { mend } else { "" };
+    Err(Error::content(table.file(), format!("its times are {}{mend}", problem.replace("{}", file))))
 }
 
 /// Continues a recording. A table that is refused, a kill and a full disk leave it as it was, and of two commands the second is refused.
@@ -259,7 +268,7 @@ fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, O
         Ok(table)
     };
     let mut table = open()?;
-    check_clock(&mut table, schema.time(), begin, &file)?;
+    check_clock(&mut table, schema.time(), begin, &file, "pack the table into a file of its own")?;
     // A live table is appended as it comes: its rows cannot be read again.
     if !target::is_live() {
         TableRows::new(open()?, schema.time()).check()?;
@@ -330,7 +339,7 @@ pub(crate) fn run(options: &PackOptions) -> Result<Ending, Error> {
         _ => create(options, effort)?,
     };
     if options.json {
-        say!("{}", serde_json::to_string(&done)?);
+        say::data(&serde_json::to_string(&done)?);
     } else {
         let (rows, columns, bytes) = (done.rows, done.bounds.len(), done.bytes);
         let bits = match rows {

@@ -8,6 +8,21 @@ use std::cell::RefCell;
 use std::fmt::{self, Write as _};
 use std::io::Write as _;
 
+/// Largest number of characters of a name in a text, and of a line of a message. The end of a line is kept, since it says what to do.
+const MAX_NAME: usize = 200;
+const MAX_LINE: usize = 4000;
+
+/// The text, or its first and last characters if it has more than `most`.
+fn shortened(text: Cow<'_, str>, most: usize) -> Cow<'_, str> {
+    let length = text.chars().count();
+    if length <= most {
+        return text;
+    }
+    let begin: String = text.chars().take(most / 2).collect();
+    let end: String = text.chars().skip(length - (most - most / 2)).collect();
+    Cow::Owned(format!("{begin}…{end}"))
+}
+
 /// Whether a character would control a terminal, or reorder the text around it.
 fn is_control(character: char) -> bool {
     character.is_control() || matches!(character, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
@@ -37,9 +52,9 @@ pub(crate) fn plain(text: &str) -> Cow<'_, str> {
     escaped(text, |character| matches!(character, '\n' | '\t'))
 }
 
-/// A name without any control character, as it may stand within a line.
+/// A name without any control character, as it may stand within a line; of a long one the beginning and the end.
 pub(crate) fn name(text: &str) -> Cow<'_, str> {
-    escaped(text, |_| false)
+    shortened(escaped(text, |_| false), MAX_NAME)
 }
 
 thread_local! {
@@ -63,16 +78,23 @@ pub(crate) fn is_collecting() -> bool {
 pub(crate) fn is_collected(text: &str) -> bool {
     COLLECTED.with_borrow_mut(|collected| match collected {
         Some(lines) => {
-            lines.extend(text.lines().map(|line| name(line).into_owned()));
+            lines.extend(text.lines().map(|line| escaped(line, |_| false).into_owned()));
             true
         }
         None => false,
     })
 }
 
-/// Writes a message and a line end to standard error.
+/// Writes a message and a line end to standard error. Long lines are shortened.
 pub(crate) fn line(message: fmt::Arguments<'_>) {
-    let text = format!("{message}\n");
+    let message = message.to_string();
+    let lines = message.split('\n').map(|line| shortened(line.into(), MAX_LINE));
+    data(&lines.collect::<Vec<_>>().join("\n"));
+}
+
+/// Writes a text and a line end to standard error, whole.
+pub(crate) fn data(text: &str) {
+    let text = format!("{text}\n");
     if is_collected(&text) {
         return;
     }
@@ -95,5 +117,12 @@ mod tests {
         assert_eq!(plain("a\tb\n"), "a\tb\n");
         assert_eq!(plain("\u{1b}[2J\u{9b}31m\u{202e}x\r"), "\\u{1b}[2J\\u{9b}31m\\u{202e}x\\u{d}");
         assert_eq!(name("a\nb °F"), "a\\u{a}b °F");
+    }
+
+    #[test]
+    fn long_names_keep_both_ends() {
+        let long = format!("first{}last", "°".repeat(100_000));
+        let shown = name(&long);
+        assert!(shown.starts_with("first") && shown.ends_with("last") && shown.chars().count() == 201, "{shown}");
     }
 }

@@ -8,7 +8,7 @@ use crate::say::say;
 use crate::unpack::{selection, warn_of_end};
 use crate::{Ending, clock, recording};
 use fewbits_recipes::words;
-use fewbits_record::{Aggregate, Schema, Stretch, TimeBase, WholeAggregate};
+use fewbits_record::{Aggregate, Schema, Stretch, TimeBase, TimeFormat, WholeAggregate};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -75,6 +75,14 @@ fn length(text: &str, time: TimeBase) -> Result<u64, Error> {
     }
 }
 
+/// The kind of the times, and the decimals of their ticks.
+fn parts(time: TimeBase) -> (Option<TimeFormat>, u8) {
+    match time {
+        TimeBase::Clock { decimals, format, .. } => (Some(format), decimals),
+        _ => (None, 0),
+    }
+}
+
 /// The columns whose numbers are values: those of words have none.
 fn columns(options: &CatOptions, schema: &Schema, names: Vec<String>) -> Result<Vec<String>, Error> {
     let is_words = |name: &String| {
@@ -93,30 +101,33 @@ fn columns(options: &CatOptions, schema: &Schema, names: Vec<String>) -> Result<
 pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
     let mut ending = Ending::Good;
     let mut found: BTreeMap<i64, Stretch> = BTreeMap::new();
-    let mut head: Option<(TimeBase, u64, Vec<String>, String)> = None;
+    let mut head: Option<(Vec<String>, String)> = None;
+    let mut playbacks = Vec::new();
+    for file in &options.files {
+        playbacks.push(recording::open(Path::new(file))?);
+    }
+    let times: Vec<TimeBase> = playbacks.iter().map(|playback| playback.schema().time()).collect();
+    let (format, decimals): (Vec<_>, Vec<_>) = times.iter().map(|time| parts(*time)).unzip();
+    if let Some(i) = (0..format.len()).find(|i| format[*i] != format[0]) {
+        return Err(Error::content(&options.files[i], format!("has other times than {}", options.files[0])));
+    }
+    // Times of several recordings are those of the finest ticks.
+    let Some((finest, time)) = decimals.iter().zip(&times).max_by_key(|(decimals, _)| **decimals) else {
+        return Ok(ending);
+    };
     // Whether each column has whole numbers of 64 bits, in the first recording.
     let mut wholes: Option<Vec<bool>> = None;
     let mut first_schema: Option<Schema> = None;
-    for file in &options.files {
-        let mut playback = recording::open(Path::new(file))?;
+    for ((file, mut playback), decimals) in options.files.iter().zip(playbacks).zip(&decimals) {
+        let scale = 10_i64.saturating_pow(u32::from(finest - decimals));
         let schema = playback.schema().clone();
         let selection = selection(options, &schema, file)?;
         let names = match &head {
             None => columns(options, &schema, selection.names)?,
-            Some((_, _, names, _)) => names.clone(),
+            Some((names, _)) => names.clone(),
         };
         let every = length(every, schema.time())?;
-        let unit = |time: TimeBase| match time {
-            TimeBase::Clock { decimals, format, .. } => Some((decimals, format)),
-            _ => None,
-        };
-        match &head {
-            Some((time, ..)) if unit(*time) != unit(schema.time()) => {
-                return Err(Error::content(file, format!("has other times than {}", options.files[0])));
-            }
-            Some(_) => {}
-            None => head = Some((schema.time(), every, names.clone(), schema.time_name().to_owned())),
-        }
+        head.get_or_insert_with(|| (names.clone(), schema.time_name().to_owned()));
         let first = first_schema.get_or_insert_with(|| schema.clone());
         for name in &names {
             if let (Ok(i), Ok(own)) = (first.position(name), schema.position(name)) {
@@ -151,7 +162,7 @@ pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
         };
         let stretches = playback.aggregates(every, selection.ticks, damaged);
         for stretch in stretches.map_err(Error::recording(file))? {
-            match found.entry(stretch.tick) {
+            match found.entry(stretch.tick.saturating_mul(scale)) {
                 std::collections::btree_map::Entry::Vacant(entry) => {
                     entry.insert(stretch);
                 }
@@ -170,7 +181,7 @@ pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
             }
         }
     }
-    let Some((time, _, names, time_name)) = head else {
+    let Some((names, time_name)) = head else {
         return Ok(ending);
     };
     let asked = [options.mean, options.min, options.max, options.count];
@@ -181,7 +192,7 @@ pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
         .filter(|(kind, asked)| *asked || (none && kind.name == "mean"))
         .map(|(kind, _)| kind)
         .collect();
-    let first = if time == TimeBase::Numbered {
+    let first = if *time == TimeBase::Numbered {
         "row"
     } else {
         time_name.as_str()
@@ -196,10 +207,10 @@ pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
         .chain(names.iter().flat_map(of_column))
         .collect();
     let mut sheet = Sheet::new(options.output.as_deref(), Shape::of(options.json), heads)?;
-    for stretch in found.values() {
-        let tick = match time {
-            TimeBase::Numbered => Cell::Whole(stretch.tick),
-            time => Cell::Text(clock::shown(stretch.tick, time)),
+    for (tick, stretch) in &found {
+        let tick = match *time {
+            TimeBase::Numbered => Cell::Whole(*tick),
+            time => Cell::Text(clock::shown(*tick, time)),
         };
         let pairs = stretch.columns.iter().zip(&stretch.wholes);
         let cells = pairs.flat_map(|(all, whole)| {

@@ -128,6 +128,13 @@ impl Target {
                 }
                 let create = || beside(&path, &name);
                 let (file, temporary) = if is_kept { create() } else { interrupt::create(create) }?;
+                if is_kept && earlier.as_ref().is_some_and(|earlier| earlier.len() > 0) {
+                    // A receiver that starts again after a kill has its earlier rows there.
+                    say!(
+                        "note: {name} is there: until the end, rows stand in {}, which then replaces it; name another output to keep both",
+                        temporary.display()
+                    );
+                }
                 if let Some(earlier) = earlier
                     && let Err(error) = file.set_permissions(earlier.permissions())
                 {

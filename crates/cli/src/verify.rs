@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::files::is_regular;
 use crate::input::Table;
 use crate::opening::day_order;
-use crate::pack::own_tolerance;
+use crate::pack::{check_clock, own_tolerance};
 use crate::rows::TableRows;
 use crate::{Ending, clock, numbers, output, recording, say};
 use fewbits_recipes::names;
@@ -147,7 +147,10 @@ pub(crate) fn run(options: &VerifyOptions) -> Result<Ending, Error> {
         },
         other => other,
     };
-    let (table, matches) = again()?;
+    let (mut table, matches) = again()?;
+    let begin = playback.ticks().map_err(Error::recording(&file))?.map(|ticks| ticks.0);
+    let mend = "name the table that the recording was made of, with the options of pack";
+    check_clock(&mut table, schema.time(), begin, &file, mend)?;
     let mut rows = TableRows::new(table, schema.time());
     let mut go = |_| ControlFlow::Continue(());
     let mut verdict = recipe(&mut playback, &mut rows, &matches, &mut go).map_err(Error::recipe(&file))?;

@@ -1,5 +1,7 @@
 //! Errors of recipes.
 
+use fewbits_table::printable;
+
 /// Why a source could not give its next rows.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 
@@ -40,7 +42,7 @@ pub enum Error {
         text: String,
     },
     /// The table has no column of this name.
-    #[error("no column `{name}`: there are {existing}{}", quoting(.existing))]
+    #[error("no column `{}`: there are {existing}{}", printable(.name), quoting(.existing))]
     NoColumn {
         /// The requested name.
         name: String,
@@ -48,7 +50,7 @@ pub enum Error {
         existing: String,
     },
     /// A column of a recording was refused.
-    #[error("column `{column}`")]
+    #[error("column `{}`", printable(.column))]
     Column {
         /// Its name.
         column: String,

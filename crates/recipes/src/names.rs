@@ -1,6 +1,7 @@
 //! Lists of names, separated by commas. A name that contains a comma or `=` stands in double quotes, in which a quote is written twice.
 
 use crate::error::Error;
+use fewbits_table::printable;
 
 /// Largest number of names that a message lists.
 const MAX_SHOWN: usize = 20;
@@ -61,13 +62,14 @@ pub fn list(text: &str) -> Result<Vec<String>, Error> {
     parts(text)?.into_iter().map(name).collect()
 }
 
-/// Names as a list that [`list`] reads back. Of more than 20 only the first are written, and the number of others.
+/// Names as a list that [`list`] reads back. Of more than 20 only the first are written, and the number of others; of a name at most 80
+/// characters.
 pub fn shown<S: AsRef<str>>(names: &[S]) -> String {
     let one = |name: &S| {
-        let name = name.as_ref();
-        let is_plain = !name.is_empty() && name.trim() == name && !name.contains([',', '=', '"']);
+        let name = printable(name.as_ref());
+        let is_plain = !name.is_empty() && name.trim().len() == name.len() && !name.contains([',', '=', '"']);
         if is_plain {
-            name.to_owned()
+            name
         } else {
             format!("\"{}\"", name.replace('"', "\"\""))
         }
@@ -116,5 +118,9 @@ mod tests {
         let names: Vec<String> = (0..4000).map(|i| format!("c{i}")).collect();
         let message = position(&names, "x").unwrap_err().to_string();
         assert!(message.ends_with("c19 and 3980 more") && message.len() < 200, "{message}");
+        let message = position(&["n".repeat(100_000)], &"x".repeat(100_000))
+            .unwrap_err()
+            .to_string();
+        assert!(message.len() < 300, "{message}");
     }
 }

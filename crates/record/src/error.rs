@@ -39,8 +39,13 @@ pub enum Error {
         supported: u8,
     },
     /// The header is incomplete or does not match its checksum. Then nothing can be decoded.
-    #[error("the header is damaged ({0})")]
+    #[error("{}", header_described(*.0))]
     Header(Damage),
+    /// The recording is one block, and its bytes do not match their checksum: the end is missing, or bytes have changed. Then nothing can be decoded.
+    #[error(
+        "the recording is cut off, or bytes of it have changed: it is one block, of which then nothing can be read"
+    )]
+    Single,
     /// A block, or bytes between blocks, cannot be read. All other blocks can.
     #[error("{}", described(*.offset, *.bytes, *.damage))]
     Block {
@@ -55,7 +60,7 @@ pub enum Error {
     #[error("a frame of another table")]
     OtherTable,
     /// The recording has no such column.
-    #[error("no column `{name}`: the recording has {existing}")]
+    #[error("no column `{}`: the recording has {existing}", shortened(.name))]
     UnknownColumn {
         /// The requested name.
         name: String,
@@ -96,6 +101,13 @@ pub enum Damage {
     /// The recording has no end: it was not finished, or its last bytes are missing.
     #[error("not finished, or cut off")]
     NoEnd,
+}
+
+fn header_described(damage: Damage) -> String {
+    match damage {
+        Damage::CutOff => "the recording is cut off within its header, so nothing of it can be read".into(),
+        damage => format!("the header is damaged ({damage})"),
+    }
 }
 
 /// Damage in words. Some kinds have no bytes of their own.
@@ -139,9 +151,17 @@ impl Error {
     }
 }
 
+/// A name for a message: at most 80 characters of it.
+fn shortened(name: &str) -> String {
+    match name.char_indices().nth(80) {
+        Some((end, _)) => format!("{}…", &name[..end]),
+        None => name.to_owned(),
+    }
+}
+
 /// Names with commas between them; of more than 20 the first ones, and the number of others.
 pub(crate) fn listed<'a>(mut names: impl Iterator<Item = &'a str>) -> String {
-    let mut text = names.by_ref().take(20).collect::<Vec<_>>().join(", ");
+    let mut text = names.by_ref().take(20).map(shortened).collect::<Vec<_>>().join(", ");
     match names.count() {
         0 => {}
         more => text += &format!(" and {more} more"),

@@ -81,7 +81,7 @@ impl Header {
         let (content, check) = bytes
             .split_last_chunk::<CHECK_BYTES>()
             .ok_or(Error::Header(Damage::CutOff))?;
-        ensure!(u32::from_le_bytes(*check) == checksum(&[content]), Error::Header(Damage::Checksum));
+        ensure!(u32::from_le_bytes(*check) == checksum(&[content]), Error::Single);
         // Magic bytes and version.
         let mut body = Bytes(content.get(MAGIC.len() + 1..).ok_or(Error::Header(Damage::CutOff))?);
         let header = BLANK.body(&mut body, Layout::Single).map_err(Error::Header)?;

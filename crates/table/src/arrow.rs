@@ -122,7 +122,7 @@ fn decimals<T: ArrowPrimitiveType>(
 /// The cells of an array.
 ///
 /// # Errors
-/// If its type cannot be read, or it has a whole number that neither a double nor 64 bits with a sign hold.
+/// If its type cannot be read.
 pub(crate) fn decode(field: &Field, array: &ArrayRef) -> Result<Decoded, Error> {
     // Whole ticks of seconds, as older versions of the command `fewbits` wrote them.
     if let Some(decimals) = field
@@ -191,7 +191,11 @@ fn plain(array: &ArrayRef) -> Option<Decoded> {
             }
             let exact = |x: u64| ((x as f64) as u128 == u128::from(x)).then_some(x as f64);
             let doubles = whole.iter().map(|cell| cell.map_or(Some(None), |x| exact(x).map(Some)));
-            Some(Decoded::Cells(Cells::Numbers(doubles.collect::<Option<_>>()?)))
+            Some(match doubles.collect::<Option<_>>() {
+                Some(doubles) => Decoded::Cells(Cells::Numbers(doubles)),
+                // As text, so that the refusal has the cell and its row, and the cell may be named as a gap.
+                None => Decoded::Texts(whole.into_iter().map(|cell| cell.map(|x| x.to_string())).collect()),
+            })
         }
         DataType::Decimal32(_, scale) => decimals::<Decimal32Type>(array, *scale, |x| Some(x.into())),
         DataType::Decimal64(_, scale) => decimals::<Decimal64Type>(array, *scale, |x| Some(x.into())),

@@ -5,7 +5,7 @@ use crate::dialect::{Delimiter, Dialect};
 use crate::error::{Error, Place};
 use crate::head::Head;
 use crate::lines::{MAX_ROW_LINES, Split};
-use crate::{guess, known, limits, marks, missing, number};
+use crate::{above, guess, known, limits, marks, missing, number};
 
 /// What a cell looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -271,7 +271,7 @@ fn layout(
                 dialect.units_row.get_or_insert(false);
             } else if dialect.units_row.is_none() && dialect.skip_after_names.is_none() {
                 let is_units = header > 0
-                    && filled(&rows[header - 1].1) == filled(&rows[header].1)
+                    && above::filled(&rows[header - 1].1) == above::filled(&rows[header].1)
                     && looks[header - 1].first() != Some(&Look::Number)
                     && !looks[header - 1].contains(&Look::Time)
                     && looks[header - 1].contains(&Look::Text)
@@ -337,8 +337,9 @@ fn layout(
             }
             dialect.skip = Some(lines_before(rows[header].0));
             let mut found = from_header(rows, header, dialect);
-            if let (Some((_, names)), Some((_, above))) = (&mut found.names, header.checked_sub(1).map(|i| &rows[i])) {
-                take_names_above(names, above, filled(&rows[data].1), comma);
+            if let Some((_, names)) = &mut found.names {
+                let is_name = |name: &str| look(name, comma) == Look::Text;
+                above::take_names(names, &rows[..header], above::filled(&rows[data].1), is_name);
             }
             Ok(found)
         }
@@ -356,28 +357,6 @@ fn several_tables(line: u64) -> Error {
         problem: "rows of numbers stand above the line of names, as if this were a table before another".to_owned(),
         mend: "make a file of each table; if these are settings, say --skip with the number of lines above the names",
     }
-}
-
-/// Names of the line above for columns that have none in the last one, which names the columns of an index alone.
-/// `width`: number of cells of a row.
-fn take_names_above(names: &mut [String], above: &[String], width: usize, comma: bool) {
-    let count = filled(names);
-    if width <= count {
-        return;
-    }
-    let is_index = count > 0 && names[..count].iter().all(|name| !name.is_empty());
-    let others = above.get(count..names.len()).unwrap_or_default();
-    if is_index && !others.is_empty() && others.iter().all(|name| look(name, comma) == Look::Text) {
-        names[count..].clone_from_slice(others);
-    }
-}
-
-/// Number of cells up to the last that is not empty.
-fn filled(cells: &[String]) -> usize {
-    cells
-        .iter()
-        .rposition(|cell| !cell.is_empty())
-        .map_or(0, |last| last + 1)
 }
 
 fn from_header(rows: &[(u64, Vec<String>)], header: usize, dialect: &mut Dialect) -> Layout {

@@ -100,14 +100,24 @@ pub(crate) fn goes_back(sample: &[String]) -> bool {
     4 * backward > numbers.len()
 }
 
-/// The offset that a name states, as `Date Time, GMT-07:00` and `Time (UTC +1)`.
+/// The offset that a name states, as `Date Time, GMT-07:00`, `Time (UTC +1)` and `time_utc`.
 pub(crate) fn offset_in(name: &str) -> Option<String> {
-    let at = name.find("GMT").or(name.find("UTC"))?;
+    let lower = name.to_lowercase();
+    let says = |zone: &str| {
+        let words = || lower.split(|c: char| !c.is_ascii_alphanumeric());
+        words().any(|word| word == zone) && !words().any(|word| matches!(word, "local" | "not"))
+    };
+    let Some(at) = name.find("GMT").or(name.find("UTC")) else {
+        return says("utc").then(|| "UTC".to_owned());
+    };
     let text: String = name[at + 3..]
         .trim_start()
         .chars()
         .take_while(|c| c.is_ascii_digit() || "+-:".contains(*c))
         .collect();
+    if text.is_empty() && (says("utc") || says("gmt")) {
+        return Some("UTC".to_owned());
+    }
     civil::offset(&text).map(|_| text)
 }
 

@@ -22,6 +22,10 @@ pub(crate) fn hint(text: &str) -> &'static str {
             .all(|c| c.is_ascii_digit() || SPACES.contains(&c) || "+-., ".contains(c));
     if text.contains('\0') {
         "the cell has NUL bytes, as after a loss of power: leave such lines out with --skip-bad 1 or more"
+    } else if text.contains(|c: char| c.is_numeric() && !c.is_ascii()) && digits == 0 {
+        "only the digits 0 to 9 are read: convert the column, or leave it out with --without"
+    } else if digits > 0 && text.starts_with(['<', '>', '≤', '≥']) {
+        "if it is below or above a limit of detection, `fewbits track` takes it; elsewhere make it a gap with --missing"
     } else if digits == 0 {
         "make it a gap with --missing, leave such lines out with --skip-bad, or the column with --without"
     } else if is_grouped {
@@ -82,6 +86,12 @@ const CURRENCIES: [char; 4] = ['$', '€', '£', '¥'];
 /// Marks that tables put behind numbers that are estimated, revised or doubtful.
 const FLAGS: [char; 7] = ['*', '!', '#', '^', '~', '?', '<'];
 
+/// Units that may stand at once behind a number with decimals.
+const UNITS: [&str; 36] = [
+    "C", "F", "K", "V", "A", "W", "mV", "mA", "mW", "kW", "MW", "Wh", "kWh", "Hz", "kHz", "Pa", "hPa", "kPa", "bar",
+    "mbar", "m", "mm", "cm", "km", "s", "ms", "g", "kg", "l", "L", "dB", "dBm", "ppm", "rpm", "k", "M",
+];
+
 /// Whether a text is likely a number of another spelling, with groups, a decimal comma or a unit.
 pub(crate) fn looks_like_number(text: &str) -> bool {
     let text = text
@@ -106,8 +116,10 @@ pub(crate) fn looks_like_number(text: &str) -> bool {
         || hexadecimal.is_some_and(|digits| digits.bytes().all(|c| c.is_ascii_hexdigit()));
     let has_unit = without_unit(size).is_some_and(|(number, unit)| {
         let is_spaced = size.as_bytes().get(number.len()) == Some(&b' ');
-        number.parse::<f64>().is_ok()
+        let has_decimals = number.contains(['.', ',']);
+        number.replace(',', ".").parse::<f64>().is_ok()
             && (unit.starts_with(['%', '°', 'µ'])
+                || has_decimals && UNITS.contains(&unit)
                 || unit.chars().all(|c| FLAGS.contains(&c))
                 || (is_spaced && unit.len() <= 6 && !unit.contains(' ')))
     });

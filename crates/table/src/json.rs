@@ -29,7 +29,7 @@ pub(crate) fn flattened(line: &str, number: u64) -> Result<Vec<(String, String)>
     if done { Ok(pairs) } else { Err(refused(reader.at)) }
 }
 
-/// Whether the only object is a row: it has no lists of one length, one of them of times, which are columns.
+/// Whether the only object is a row: it has no lists of one length, one of them of times, which are columns, and no list of objects with times.
 pub(crate) fn check_alone(pairs: &[(String, String)]) -> Result<(), Error> {
     let mut lists: Vec<(&str, usize)> = Vec::new();
     for (key, _) in pairs {
@@ -48,6 +48,21 @@ pub(crate) fn check_alone(pairs: &[(String, String)]) -> Result<(), Error> {
             what: "JSON, a list for each column",
             mend: "make a table of it: jq -r 'keys_unsorted, ([.[]] | transpose[]) | @csv' FILE | fewbits ... -, with `.hourly | ` \
                    before it, or the like, if the lists stand in an object",
+        });
+    }
+    // A list of objects, each with a time of its own.
+    let nth = |key: &str, index: &str| {
+        let (list, field) = key.rsplit_once('.')?;
+        let list = list.strip_suffix(index)?.strip_suffix('.')?;
+        is_time_name(field).then(|| format!("{list}.1.{field}"))
+    };
+    let second = |(key, _): &(String, String)| {
+        nth(key, "0").is_some_and(|second| pairs.iter().any(|(other, _)| *other == second))
+    };
+    if pairs.iter().any(second) {
+        return Err(Error::Format {
+            what: "JSON, a list of rows within an object",
+            mend: "make lines of them, with the name of the list in place of readings: jq -c '.readings[]' FILE | fewbits ... -",
         });
     }
     Ok(())

@@ -40,6 +40,7 @@
 //! The features `gzip` and `zstd` read packed text, `parquet` reads Parquet through Arrow arrays (`Table::open_parquet`). Without features the
 //! crate builds for WebAssembly; it opens no files. Not here: files and options (`fewbits-cli`), recordings (`fewbits-record`), estimation.
 
+mod above;
 #[cfg(feature = "parquet")]
 mod arrow;
 mod calendar;

@@ -1,12 +1,18 @@
 //! What points and commas in numbers mean, by the first rows.
 
-use crate::hint::SPACES;
+use crate::hint::{BLANKS, SPACES, without_unit};
 
 /// Whether numbers have decimal commas without a doubt: a comma before other than three digits, and no decimal points.
 pub(crate) fn has_decimal_commas(rows: &[(u64, Vec<String>)]) -> bool {
     let (mut certain, mut points) = (false, false);
     for cell in rows.iter().flat_map(|(_, cells)| cells) {
+        let cell = cell.trim_matches(BLANKS).trim();
         let size = without_exponent(cell.trim_start_matches(['-', '+', '\u{2212}']));
+        // A unit behind the number, as in `20,5 °C` and `40,1 %`.
+        let size = match without_unit(size) {
+            Some((number, unit)) if unit.chars().count() <= 6 && !unit.contains([',', '.', ' ']) => number,
+            _ => size,
+        };
         // Spaces between groups of digits, as of French spreadsheets, say nothing of decimals.
         let is_spaced = |c: char| c == ' ' || SPACES.contains(&c);
         let bare;
@@ -85,12 +91,21 @@ pub(crate) fn doubtful_groups(rows: &[(u64, Vec<String>)]) -> Option<(u64, &str)
     })
 }
 
-/// The mark around cells: a single one if all cells of the names, or of the first row, stand between two.
+/// The mark around cells: a single one if all cells of the names, or of the first row, stand between two, or if each of the first lines has a
+/// delimiter between two.
 pub(crate) fn quote(lines: &[&str]) -> char {
     let is_quoted = |cell: &str| cell.len() > 1 && cell.starts_with('\'') && cell.ends_with('\'');
     let is_single = lines
         .iter()
         .take(2)
         .any(|line| line.split([',', ';', '\t']).all(is_quoted));
+    let is_around = |line: &&str, delimiter: char| {
+        let mut cells = line.split(delimiter);
+        cells.any(|cell| cell.starts_with('\'') && !cell[1..].contains('\''))
+            && cells.any(|cell| cell.ends_with('\'') && !cell.starts_with('\''))
+    };
+    let first = &lines[..lines.len().min(5)];
+    let are_around = |delimiter: &char| first.len() > 1 && first.iter().all(|line| is_around(line, *delimiter));
+    let is_single = is_single || [',', ';', '\t'].iter().any(are_around);
     if is_single { '\'' } else { '"' }
 }

@@ -68,6 +68,9 @@ impl Table {
             of_keys(&head, reader, &mut dialect, "InfluxDB line protocol", influx::pairs)?
         } else {
             let is_open = said.no_header.is_none() && said.skip.is_none();
+            if let Some(refused) = logs::sure_refusal(&head).filter(|_| is_open && said.delimiter.is_none()) {
+                return Err(refused);
+            }
             of_text(&head, reader, &mut dialect, said)
                 .map_err(|error| logs::refusal(&head).filter(|_| is_open).unwrap_or(error))?
         };

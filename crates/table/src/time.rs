@@ -108,11 +108,8 @@ impl Time {
     pub fn shown(self, scale: Scale, decimals: u8) -> String {
         let (whole, rest) = (self.0.div_euclid(SECOND), self.0.rem_euclid(SECOND));
         let decimals = usize::from(decimals.min(DECIMALS));
-        let stamp = i64::try_from(whole)
-            .ok()
-            .and_then(|whole| jiff::Timestamp::from_second(whole).ok());
-        if let (Scale::Utc | Scale::Local, Some(stamp)) = (scale, stamp) {
-            let date = Offset::UTC.to_datetime(stamp);
+        let date = i64::try_from(whole).ok().and_then(datetime);
+        if let (Scale::Utc | Scale::Local, Some(date)) = (scale, date) {
             let zone = if scale == Scale::Utc { "Z" } else { "" };
             let fraction = &format!("{rest:018}")[..decimals];
             let point = if decimals == 0 { "" } else { "." };
@@ -126,6 +123,21 @@ impl Time {
         let point = if fraction.is_empty() { "" } else { "." };
         format!("{sign}{whole}{point}{fraction}")
     }
+}
+
+/// The date of so many seconds since 1970, if it is in the years -9999 to 9999.
+fn datetime(seconds: i64) -> Option<jiff::civil::DateTime> {
+    const TWO_DAYS: i64 = 2 * 86_400;
+    let of = |seconds: i64| jiff::Timestamp::from_second(seconds).map(|stamp| Offset::UTC.to_datetime(stamp));
+    // The last day at either end has no time stamp.
+    let shift = if seconds > 0 { TWO_DAYS } else { -TWO_DAYS };
+    let shifted = || {
+        of(seconds.checked_sub(shift)?)
+            .ok()?
+            .checked_add(jiff::SignedDuration::from_secs(shift))
+            .ok()
+    };
+    of(seconds).ok().or_else(shifted)
 }
 
 /// Decimals of a second that attoseconds below one second need.

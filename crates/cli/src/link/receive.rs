@@ -65,7 +65,15 @@ fn receive_stream(options: &ReceiveOptions) -> Result<Ending, Error> {
 fn receive_datagrams(options: &ReceiveOptions, address: &str) -> Result<Ending, Error> {
     let mut socket = Udp::bind(address)
         .map_err(of_socket)
-        .map_err(Error::io(address, "listen"))?;
+        .map_err(|error| match error.kind() {
+            std::io::ErrorKind::InvalidInput => {
+                Error::option("--udp", address, "an address of this machine and a port, as 0.0.0.0:9000")
+            }
+            std::io::ErrorKind::AddrInUse => {
+                Error::content(address, "another program listens there: end it, or take another port")
+            }
+            _ => Error::io(address, "listen")(error),
+        })?;
     say!("listening at {}", socket.address());
     // A signal is the end: what did not arrive is counted.
     interrupt::watch();

@@ -5,7 +5,7 @@ use super::rows::Instants;
 use super::transform::Transform;
 use crate::error::Error;
 use crate::output::Cell;
-use crate::say::say;
+use crate::say::{self, say};
 
 /// Deviations to either side of a mean that hold 95 % of a normal law.
 pub(super) const BAND: f64 = 1.96;
@@ -27,7 +27,7 @@ pub(super) fn first_name(instants: &Instants) -> &'static str {
 /// Prints a summary: as JSON or as lines.
 pub(super) fn summarise(summary: &impl serde::Serialize, lines: &[String], json: bool) -> Result<(), Error> {
     if json {
-        say!("{}", serde_json::to_string(summary)?);
+        say::data(&serde_json::to_string(summary)?);
     } else {
         lines.iter().for_each(|line| say!("{line}"));
     }

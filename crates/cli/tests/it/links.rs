@@ -204,3 +204,29 @@ fn noise_enters_no_table() {
     let (output, said) = ended(receiver);
     assert_eq!(text(&output.stdout), two_columns(), "{said}");
 }
+
+#[test]
+fn addresses_that_cannot_be_listened_at_are_named() {
+    let (_kept, folder) = super::folder();
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let taken = socket.local_addr().unwrap().to_string();
+    for (address, said) in [
+        (taken.as_str(), "another program listens there"),
+        ("9000", "as 0.0.0.0:9000"),
+    ] {
+        let refusal = super::refused(&folder, &["receive", "--udp", address], b"");
+        assert!(refusal.contains(said), "{refusal}");
+    }
+}
+
+/// A receiver that starts again after a kill would replace its earlier rows unnoticed.
+#[test]
+fn an_output_that_is_there_is_told() {
+    let (_kept, folder) = super::folder();
+    std::fs::write(folder.join("day.csv"), "time,v\n1,2\n").unwrap();
+    let (mut child, address, rest) = receiver(&folder, &["-o", "day.csv", "--timeout", "1s"]);
+    deliver(&address, datagrams(&folder, "time,v\n5,6\n", &["--time", "exact"]));
+    assert!(child.wait().unwrap().success());
+    let said = rest.join().unwrap();
+    assert!(said.contains("day.csv is there") && said.contains(".partial, which then replaces it"), "{said}");
+}

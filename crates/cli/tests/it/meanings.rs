@@ -41,7 +41,7 @@ fn times_of_another_kind_are_not_appended() {
         ("local", "utc", "of its own"),
         ("local", "since", "of its own"),
         ("run", "utc", "of its own"),
-        ("run", "local", "--time-zone"),
+        ("run", "local", "of its own"),
     ] {
         let (file, csv) = (format!("{to}.fewb"), format!("{table}.csv"));
         let before = std::fs::read(folder.join(&file)).unwrap();
@@ -113,8 +113,17 @@ fn recordings_of_other_decimals_are_one_table() {
         "2024-03-05T10:00:02.5Z",
     ];
     assert_eq!(text(&good(&folder, &from, b"")).lines().count(), 3);
+    for names in [["a.fewb", "b.fewb"], ["b.fewb", "a.fewb"]] {
+        let rows = text(&good(&folder, &["cat", names[0], names[1], "--every", "2s"], b""));
+        assert_eq!(rows, "time,v mean\n2024-03-05T10:00:00Z,1.5\n2024-03-05T10:00:02Z,3.5\n");
+    }
     put(&folder, "c.csv", &["time,v", "2024-03-05T10:00:00,1"]);
     pack(&folder, "c");
+    // Equal digits are other times.
+    put(&folder, "d.csv", &["time,v", "2024-03-05T10:00:00,1", "2024-03-05T10:00:02,3"]);
+    assert!(refused(&folder, &["verify", "d.csv", "a.fewb"], b"").contains("say --time-zone UTC"));
+    good(&folder, &["verify", "d.csv", "a.fewb", "--time-zone", "UTC"], b"");
+    assert!(refused(&folder, &["verify", "a.csv", "c.fewb"], b"").contains("no zone or date"));
     let refusal = refused(&folder, &["cat", "a.fewb", "c.fewb"], b"");
     assert!(refusal.contains("times without a zone in recording 2: expected UTC, as in the first"), "{refusal}");
 }

@@ -384,3 +384,21 @@ fn first_column_taken_for_the_time_is_told() {
         );
     }
 }
+
+#[test]
+fn messages_do_not_repeat_long_names() {
+    let name = "x".repeat(50_000);
+    let bad = format!("time,{name}\n1,1\n2,2\n3,abc\n");
+    let kept = folder(&[("long.csv", &bad), ("good.csv", &bad.replace("abc", "3"))]);
+    let folder = kept.path();
+    for words in [
+        &["pack", "long.csv", "--time", "exact", "-o", "l.fewb"][..],
+        &["pack", "good.csv", "--time", "exact", "-o", "l.fewb"],
+        &["pack", "good.csv", "--bound", "q=1", "-o", "l.fewb"],
+        &["pack", "good.csv", "--bound", &format!("{name}y=1"), "-o", "l.fewb"],
+    ] {
+        let refusal = refused(folder, words, b"");
+        assert!(refusal.len() < 6000, "{}", refusal.len());
+    }
+    assert!(text(&good(folder, &["look", "good.csv"], b"")).len() < 2000);
+}

@@ -151,6 +151,10 @@ fn a_single_block_is_read_whole_or_not_at_all() {
     for length in 0..bytes.len() {
         assert!(Playback::new(Cursor::new(&bytes[..length])).is_err(), "{length}");
         assert!(BlockReader::new(&bytes[..length]).is_err(), "{length}");
+        if length > 0 {
+            let error = Playback::new(Cursor::new(&bytes[..length])).err().unwrap();
+            assert!(error.to_string().contains("the recording is cut off"), "{length}: {error}");
+        }
     }
     for bit in 0..8 * bytes.len() {
         let mut flipped = bytes.clone();

@@ -196,6 +196,27 @@ fn every_flipped_bit_is_an_error_or_values() {
     assert!(refused > 100, "{refused}");
 }
 
+#[test]
+fn whole_numbers_beyond_64_bits_with_a_sign_name_their_row() {
+    let columns = || -> Vec<(&str, ArrayRef)> {
+        vec![
+            ("t", Arc::new(Int64Array::from(vec![1, 2, 3]))),
+            ("u", Arc::new(UInt64Array::from(vec![1, u64::MAX, 5]))),
+        ]
+    };
+    let mut table = open(file(columns(), Compression::SNAPPY));
+    assert_eq!(table.read(&mut Batch::default(), 1).unwrap(), 1);
+    let said = table.read(&mut Batch::default(), 10).unwrap_err().to_string();
+    assert!(said.contains("row 2, column `u`: `18446744073709551615` is a whole number"), "{said}");
+    let missing = Dialect {
+        missing: vec![u64::MAX.to_string()],
+        ..Dialect::default()
+    };
+    let bytes = bytes::Bytes::from(file(columns(), Compression::SNAPPY));
+    let batch = all(&mut Table::open_parquet(bytes, &missing).unwrap());
+    assert_eq!(numbers(&batch.columns[1]), [Some(1.0), None, Some(5.0)]);
+}
+
 /// A file of pyarrow with the checksums of its pages: no flipped bit of a value passes.
 #[test]
 fn pages_that_disagree_with_their_checksum_are_refused() {

@@ -69,6 +69,23 @@ fn sentences_and_logs_are_named() {
         let refusal = not_opened(&repeated(line));
         assert!(refusal.contains("this is a log") && refusal.contains(mend), "{refusal}");
     }
+    // A table of words could be made of these.
+    for (line, what, mend) in [
+        ("Mar  5 10:00:0@ pi kernel: [    1.234567] thermal zone0: temp=4512@", "a log", "with the year"),
+        ("[    @.234567] thermal zone0: temp=45123", "a log of a kernel", "time,temp"),
+        ("[Tue Mar  5 10:00:0@ 2024] thermal zone0: temp=45123", "a log of a kernel", "time,temp"),
+        (
+            "10.0.0.1 - - [05/Mar/2024:10:00:0@ +0100] \"GET /a?t=2 HTTP/1.1\" 200 23@",
+            "web server",
+            "time,status,bytes",
+        ),
+        ("+CSQ: 1@,99\r\n\r\nOK", "a modem", "(echo rssi,ber"),
+        ("2024-03-05 10:00:0@ +CSQ: 1@,99", "a modem", "(echo time,rssi,ber"),
+        ("2024-03-05 10:00:0@ host app[1]: temp=2@", "a log", "+[^ ]+"),
+    ] {
+        let refusal = not_opened(&repeated(line));
+        assert!(refusal.contains(what) && refusal.contains(mend), "{refusal}");
+    }
     assert!(not_opened("<html>\n<td>1</td>\n").contains("HTML"));
     let rows_of_numbers = not_opened("2026-03-05T10:00:00 1 2\n2026-03-05T10:00:01 1 2\n");
     assert!(rows_of_numbers.contains("no line of names"), "{rows_of_numbers}");

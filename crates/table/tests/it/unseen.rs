@@ -275,3 +275,112 @@ fn files_that_are_no_text_are_named() {
     let message = not_opened("\"TOB1\",\"St\",\"CR1000\"\n\"SECONDS\",\"T\"\n\u{1}\u{2}\u{3}\n");
     assert!(message.contains("TOA5"), "{message}");
 }
+
+fn names(table: &Table) -> Vec<&str> {
+    table
+        .selected()
+        .iter()
+        .map(|i| table.columns()[*i].name.as_str())
+        .collect()
+}
+
+/// Defect: the names of the upper line were left out as a title.
+#[test]
+fn equal_names_are_told_apart_by_the_line_above() {
+    let row = |i: usize| format!("2026-03-01 {i:02}:00,20.{i},{i},5.{i},{i}");
+    let rows = (0..12).map(|i| row(i) + "\n").collect::<String>();
+    for (above, expected) in [
+        (",Kitchen,,Attic,", ["Kitchen T", "Kitchen H", "Attic T", "Attic H"]),
+        ("place,Kitchen,Kitchen,Attic,Attic", ["Kitchen T", "Kitchen H", "Attic T", "Attic H"]),
+        ("Report,,,,", ["T", "H", "T_2", "H_2"]),
+    ] {
+        let table = open(&format!("{above}\ntime,T,H,T,H\n{rows}"));
+        assert_eq!(names(&table), expected, "{above}");
+    }
+    let table = open(&format!("sensor,T,T,H,H\nroom,a,b,a,b\ntime,,,,\n{rows}"));
+    assert_eq!(names(&table), ["T a", "T b", "H a", "H b"]);
+    let table = open(&format!("time,T1,T2,T3,T4\n,,quality,,number\n{rows}"));
+    assert_eq!(names(&table), ["T1", "quality", "T3", "number"]);
+}
+
+#[test]
+fn names_that_say_utc_alone_state_it() {
+    for header in ["Datum;Tid (UTC);v", "Datum;time_utc;v", "UTC_DATE;UTC_TIME;v"] {
+        let table = open(&lines(header, |i| format!("2026-03-01;{:02}:00:00;{i}.5", i % 20)));
+        assert_eq!(table.time().map(|time| time.1), Some(Scale::Utc), "{header}");
+    }
+    let table = open(&lines("Time (GMT);v", |i| format!("2026-03-01 {i:02}:00:00;{i}.5")));
+    assert_eq!(table.time().map(|time| time.1), Some(Scale::Utc));
+    let table = open(&lines("Local time (not UTC);v", |i| format!("2026-03-01 {i:02}:00:00;{i}.5")));
+    assert_eq!(table.time().map(|time| time.1), Some(Scale::Local));
+    let table = open(&lines("outcome;v", |i| format!("2026-03-01 {i:02}:00:00;{i}.5")));
+    assert_eq!(table.time().map(|time| time.1), Some(Scale::Local));
+}
+
+/// Defect: such columns became words.
+#[test]
+fn numbers_with_units_are_no_words() {
+    let strips = Dialect {
+        strip_units: true,
+        ..Dialect::default()
+    };
+    for (cell, first) in [
+        ("20,@ °C", 20.0),
+        ("0,@ %", 0.0),
+        ("20.@C", 20.0),
+        ("3.@kWh", 3.0),
+        ("0.@k", 0.0),
+    ] {
+        let text = lines("time;v", |i| format!("{i};{}", cell.replace('@', &(i % 10).to_string())));
+        assert!(not_opened(&text).contains("--strip-units"), "{cell}");
+        let mut table = open_said(&text, &strips).unwrap();
+        table.find_time().unwrap();
+        let cells = numbers(&rows(&mut table).columns[0]);
+        assert_eq!(cells[..2], [Some(first), Some(first + 0.1)], "{cell}");
+    }
+    // Words that begin with a digit stay words.
+    let table = open(&lines("time,band", |i| format!("{i},{}GHz", [2, 5][i % 2])));
+    assert_eq!(table.columns()[1].kind, Kind::Words);
+}
+
+#[test]
+fn what_is_no_table_of_rows_is_named() {
+    let metrics = "# HELP t temperature\n# TYPE t gauge\nt{c=\"a\"} 40 1772323200000\nt{c=\"b\"} 41 1772323200000\n";
+    assert!(not_opened(metrics).contains("Prometheus"));
+    for text in [
+        "{\"a\":1,\"rows\":[{\"t\":1,\"v\":2},{\"t\":2,\"v\":3}]}\n",
+        "{\"T\":[{\"ts\":1772323200000,\"value\":\"2\"},{\"ts\":1772323260000,\"value\":\"3\"}]}\n",
+    ] {
+        assert!(not_opened(text).contains("a list of rows"), "{text}");
+    }
+    assert!(not_opened("up{job=\"a\"} 1\nup{job=\"b\"} 0\n").contains("Prometheus"));
+    for mark in [",", ";", "\t"] {
+        let times: Vec<String> = (0..9).map(|i| format!("2026-03-01T{i:02}:00")).collect();
+        let values: Vec<String> = (0..9).map(|i| format!("{i}.5")).collect();
+        let text = format!("time{mark}{}\ntemp{mark}{}\n", times.join(mark), values.join(mark));
+        assert!(not_opened(&text).contains("on its side"), "{mark}");
+    }
+    assert!(not_opened(&lines("time,v", |i| format!("{i},{}", ['\u{663}', '\u{664}'][i % 2]))).contains("0 to 9"));
+    assert!(
+        not_opened(&lines("time,v", |i| if i == 3 { "3,<0.5".into() } else { format!("{i},{i}.5") }))
+            .contains("below or above")
+    );
+}
+
+#[test]
+fn the_last_day_of_the_calendar_is_a_date() {
+    for text in ["9999-12-31T23:59:59", "9999-12-30T22:00:01"] {
+        let shown = times(&format!("time,v\n2026-03-01T00:00:00,1\n{text},2\n"));
+        assert!(shown[1].ends_with(&text[text.len() - 14..]), "{shown:?}");
+    }
+}
+
+#[test]
+fn single_quotes_around_delimiters_are_quotes() {
+    let table = open(&lines("time;'a;b';v", |i| format!("{i};'x;y';{i}")));
+    assert_eq!(names(&table), ["a;b", "v"]);
+    let table = open(&lines("time,note,v", |i| format!("{i},'tis,it's {i}")));
+    assert_eq!(names(&table), ["note", "v"]);
+    let mut table = open(&lines("time;v", |i| format!("{i};\u{a0}{i},5\u{a0}")));
+    assert_eq!(numbers(&rows(&mut table).columns[0])[1], Some(1.5));
+}
