@@ -86,7 +86,7 @@ macro_rules! parameters {
             }
         }
 
-        $crate::rows! { @fields $name [] $($field: $type [] [] concat!("" $(, $doc)* $(, $meaning)?),)* }
+        $crate::rows! { @fields $name [] [] $($field: $type [] [] concat!("" $(, $doc)* $(, $meaning)?),)* }
     };
 }
 
@@ -139,7 +139,7 @@ macro_rules! limits {
 /// ```
 #[macro_export]
 macro_rules! rows {
-    (@fields $name:ident [$($key:tt $($effort:ident)?)?]
+    (@fields $name:ident [$($key:tt $($effort:ident)?)?] $names:tt
         $($field:ident: $type:ty [$($unit:tt)?] [$($role:ident $($label:literal)? [$($panel:ident)*])?] $meaning:expr,)*) => {
         impl $crate::schema::Field for $name {
             fn describe(row: $crate::Column, to: &mut $crate::schema::Described) {
@@ -157,8 +157,7 @@ macro_rules! rows {
             }
 
             $(fn found_by(&self) -> Option<String> {
-                const _: &str = stringify!($key);
-                Some($crate::claim::Keyed::key(self))
+                Some($crate::rows!(@key self $key $names))
             }
 
             $(fn at_full_trials() -> bool {
@@ -166,23 +165,14 @@ macro_rules! rows {
             })?)?
         }
     };
-    (@keyed $name:ident [] [$($field:ident)*]) => {};
-    (@keyed $name:ident [$key:ident] [$($field:ident)*]) => {
-        impl $crate::claim::Keyed for $name {
-            fn key(&self) -> String {
-                $key(self)
-            }
-        }
+    (@key $row:ident $key:ident $fields:tt) => {
+        $key($row)
     };
-    (@keyed $name:ident [$key:literal] [$($field:ident)*]) => {
-        impl $crate::claim::Keyed for $name {
-            #[allow(unused_variables)]
-            fn key(&self) -> String {
-                let Self { $($field),* } = self;
-                format!($key)
-            }
-        }
-    };
+    (@key $row:ident $key:literal [$($field:ident)*]) => {{
+        #[allow(unused_variables)]
+        let Self { $($field),* } = $row;
+        format!($key)
+    }};
     ($(
         $(#[$outer:meta])*
         $visible:vis struct $name:ident $(by $key:tt $(at $effort:ident)?)? {
@@ -190,14 +180,13 @@ macro_rules! rows {
                 $(as $role:ident $(($label:literal))? $(in $($panel:ident)+)?)? $(=> $meaning:literal)?,)*
         }
     )*) => {$(
-        $crate::rows! { @keyed $name [$($key)?] [$($field)*] }
         $(#[$outer])*
         $visible struct $name {
             $($(#[doc = $doc])* $(#[doc = $meaning])? $shown $field: $type,)*
         }
 
         $crate::rows! {
-            @fields $name [$($key $($effort)?)?]
+            @fields $name [$($key $($effort)?)?] [$($field)*]
             $($field: $type [$($unit)?] [$($role $($label)? [$($($panel)+)?])?] concat!("" $(, $doc)* $(, $meaning)?),)*
         }
     )*};

@@ -1,7 +1,7 @@
 //! What many figures use.
 
 pub(crate) use crate::arguments::{Refusal, accept, accept_each};
-pub(crate) use crate::claim::{Keyed, find, minus, over};
+pub(crate) use crate::claim::{find, minus, over};
 pub(crate) use crate::reference;
 pub(crate) use crate::schema::{Answer, Field, List};
 pub(crate) use crate::sweep::{distinct, first, joined, product, select};

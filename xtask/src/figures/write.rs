@@ -132,7 +132,7 @@ impl Made {
 fn blank(plot: &Plot) -> Option<String> {
     let shows = |axis: &Axis, value: f64| value.is_finite() && (axis.scale == Scale::Linear || value > 0.0);
     let is_seen = |panel: &Panel, layer: &Layer| match &layer.shape {
-        Shape::Line { points, .. } | Shape::Points { points, .. } | Shape::Bars { points, .. } => {
+        Shape::Line { points, .. } | Shape::Points { points, .. } => {
             points.iter().any(|(x, y)| shows(&panel.x, *x) && shows(&panel.y, *y))
         }
         Shape::Heat { values, .. } => values.iter().flatten().any(|value| value.is_finite()),

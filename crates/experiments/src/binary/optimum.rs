@@ -127,10 +127,6 @@ impl Figure for Optimum {
         let here = claims.at_defaults();
         let all = &rows.errors;
         let of = |sensors: usize| select(all, move |r| r.sensors == sensors);
-        let what = "dropping the rank constraint never hurts, forcing the Gray basis never helps";
-        claims.all("order", what, all, |r| {
-            r.mse_unconstrained <= r.mse_opt * (1.0 + 1e-9) && r.mse_strategy1 >= r.mse_opt * (1.0 - 1e-9)
-        });
         let what = "from 5 dB on eight optimal sensors beat Luo's under every fusion rule";
         here.all("luo", what, of(8).filter(|r| r.snr_db >= 5.0), |r| {
             let luo = [r.luo_soft, r.luo_mmse, r.luo_majority];

@@ -137,10 +137,6 @@ impl Figure for Envelope {
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        claims.all("ordered", "quantiles are ordered", &rows.band, |b| b.r05 <= b.r50 && b.r50 <= b.r95);
-        claims.all("probabilities", "exceedances are probabilities", &rows.exceedance, |e| {
-            (0.0..=1.0 + 1e-9).contains(&e.p_exceed)
-        });
         for c in &rows.coverage {
             let what = format!("nine bands in ten hold the true edge: {}", c.edge);
             full.within(format!("calibrated/{}", c.edge), what, c.coverage, 0.9, 4.0);

@@ -28,8 +28,6 @@ struct Problem<const D: usize, const K: usize> {
     scored: Vec<usize>,
 }
 
-/// Filters in the order of the columns.
-pub(super) const FILTERS: [&str; 5] = ["assumed density", "unscented", "ensemble", "grid", "particles"];
 /// Members of the ensemble.
 const MEMBERS: usize = 100;
 /// Particles.
