@@ -108,21 +108,11 @@ impl Pair {
 /// Squared errors of designs, one a line.
 pub(super) fn errors<'a>(title: &str, rows: impl Iterator<Item = (String, &'a Pair)>) -> Panel {
     let rows: Vec<_> = rows.collect();
-    let criteria = [
-        ("mi ", "information, "),
-        ("mse ", "squared error, "),
-        ("lloyd ", "Lloyd-Max, for "),
-    ];
-    let in_words = |name: &String| {
-        let name = name.replace('-', " ");
-        let long = |(short, long): &(&str, &str)| Some(format!("{long}{}", name.strip_prefix(short)?));
-        criteria.iter().find_map(long).unwrap_or(name)
-    };
     let marks = |of: fn(&Pair) -> Option<f64>| {
         let place = |(i, (_, pair)): (usize, &(String, &'a Pair))| Some((of(pair)?, -(i as f64)));
         rows.iter().enumerate().filter_map(place).collect()
     };
-    let y = Axis::ladder(rows.iter().map(|(name, _)| in_words(name)));
+    let y = Axis::ladder(rows.iter().map(|(name, _)| name.as_str()));
     Panel::new(title, Axis::linear("mean squared error / prior variances"), y)
         .with(Layer::points("exact", marks(|pair| Some(pair.mse))))
         .with(Layer::points("printed", marks(|pair| pair.printed_mse)).marked(Marker::Cross))

@@ -145,7 +145,7 @@ impl Figure for Table41 {
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let panel = |(case, title, ..): Case| {
             let rows = select(&rows.designs, |r| r.case == case);
-            errors(title, rows.map(|r| (format!("{} {}", r.method, r.design), &r.pair)))
+            errors(title, rows.map(|r| (format!("{}-{}", r.method, r.design), &r.pair)))
         };
         Plot::grid(2, CASES.map(panel).to_vec())
     }

@@ -312,9 +312,5 @@ impl Figure for Table {
             let what = "over particles the printed rule blurs the targets";
             full.above(format!("particles-{variance}"), what, ratio, blur);
         }
-        let genie = |r: &Row| first(t, |g| g.variance == r.variance && g.apart == r.apart && g.method == "genie");
-        full.all("genie", "no rule is below the genie", select(t, |r| r.method != "genie"), |r| {
-            genie(r).is_some_and(|g| g.labelled.value <= r.labelled.value)
-        });
     }
 }
