@@ -2,6 +2,7 @@
 
 pub(crate) use crate::arguments::{Refusal, accept, accept_each};
 pub(crate) use crate::claim::{find, minus, over};
+pub(crate) use crate::picture::{Named, plotted};
 pub(crate) use crate::reference;
 pub(crate) use crate::schema::{Answer, Field, List};
 pub(crate) use crate::sweep::{distinct, first, joined, product, select};

@@ -122,10 +122,7 @@ fn errata(from: &Path, check: bool) -> Result<Ending, Error> {
     let tests = tidy::errata::tests(&in_workspace(Path::new(".")))?;
     let path = in_workspace(Path::new("docs/errata.md"));
     let page = files::read(&path)?;
-    let ids: Vec<&'static str> = fewbits_experiments::all()
-        .iter()
-        .map(|figure| figure.about().id)
-        .collect();
+    let ids = fewbits_experiments::ids();
     let new = errata::written(&page, &tests, |row| {
         let shows = |id: &&&'static str| match records.get(**id) {
             Some(record) => record

@@ -1,5 +1,6 @@
 //! Files: each is written under a temporary name and then renamed, so that none is ever half-written.
 
+use super::describe::between;
 use super::record::{Record, check_sum};
 use super::{Ending, gallery, print, summary};
 use crate::Error;
@@ -176,11 +177,7 @@ impl Summary<'_> {
         let page = gallery::page(all.values(), &this_run, self.note);
         self.out.write("index.html", page.as_bytes())?;
         let text = summary::text(records, self.out.path(), elapsed);
-        let note = if self.note.is_empty() {
-            String::new()
-        } else {
-            format!("{}\n", self.note)
-        };
+        let note = between("", self.note, "\n");
         self.out.write("summary.txt", format!("{note}{text}").as_bytes())
     }
 

@@ -86,8 +86,6 @@ impl Figure for Clipping {
         let errors = errors.map(|(rule, mse)| Rule { rule, mse }).into();
         Ok(Clipped { cells, errors })
     }
-
-    fn claims(&self, _: &ClippingParameters, _: &Clipped, _: &mut Claims) {}
 }
 
 rows! {

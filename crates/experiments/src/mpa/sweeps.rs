@@ -103,7 +103,7 @@ impl Figure for Mse {
 
     fn plot(&self, _: &Effort, t: &Mses) -> Plot {
         let left_out = ["published", "narrow", "EKF-Q-naive", "unquantized", "EKF-U"];
-        let first = ladder("50 dB, four levels", select(&t.trackers, |r| !left_out.contains(&r.family)));
+        let mut plot = ladder(select(&t.trackers, |r| !left_out.contains(&r.family)));
         let families = ["EKF-Q", "GMPA", "GMPA-transfer", "guided"];
         let speed = |r: &Row| r.point.trim_start_matches('V').parse().unwrap_or(f64::NAN);
         let lines = families.map(|f| {
@@ -111,8 +111,9 @@ impl Figure for Mse {
             Layer::measured(f, of, |r| (speed(r), r.score.mse))
         });
         let x = Axis::linear("speed V / (m/step)").between(0.8, 4.2);
-        let second = Panel::new("Speed that the encoder expects", x, Axis::log(MSE)).with_all(lines);
-        Plot::grid(1, vec![first, second])
+        let speeds = Panel::new("Speed that the encoder expects", x, Axis::log(MSE)).with_all(lines);
+        plot.panels.push(speeds);
+        Plot::grid(1, plot.panels)
     }
 }
 

@@ -56,7 +56,7 @@ impl Figure for Filters {
         let row = |problem: &'static str| {
             let stream = context.stream("problems-filters").named(problem);
             let found = context.moments(stream, p.trials, |trial| errors(problem, trial.stream))?;
-            let of = |i: usize| found.get(i).map_or(Measured::new(f64::NAN, None), Measured::root_mean);
+            let of = |i: usize| Measured::root_mean(&found[i]);
             let reference = reference::value(&format!("problems-filters/particles/{problem}"));
             let ratio = |i: usize| reference.map(|reference| of(i).value / reference);
             Ok(Row {

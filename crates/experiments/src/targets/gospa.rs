@@ -98,10 +98,7 @@ impl Figure for Targets {
                 }
                 Ok(numbers)
             })?;
-            let part = |i: usize, k: usize| {
-                sums.get(4 * i + k)
-                    .map_or(Measured::new(f64::NAN, None), Measured::root_mean)
-            };
+            let part = |i: usize, k: usize| Measured::root_mean(&sums[4 * i + k]);
             let jpda = reference::value(&format!("targets-gospa/jpda/{name}")).filter(|_| p.noise == NOISE);
             rows.extend(p.bits.iter().enumerate().map(|(i, bits)| Row {
                 scenario: name,
