@@ -114,7 +114,8 @@ impl Figure for WordLength {
                 .with(Layer::points(format!("exact, {title}"), over(|r| r.loss)).coloured(i));
         }
         let lost = "fraction of the information lost, 1 - c";
-        let right = plotted(&rows.successive, "Bits about one sample", &[("", "", &|title, x| Panel::semilog(title, x, lost))]);
+        let right =
+            plotted(&rows.successive, "Bits about one sample", &[("", "", &|title, x| Panel::semilog(title, x, lost))]);
         Plot::grid(2, [vec![left], right.panels].concat())
     }
 }

@@ -96,9 +96,6 @@ impl Figure for Mse {
         full.all("layouts-improved", what, 0..4, |i| {
             over(layout(i, "improved-40"), layout(i, "GMPA-transfer")).is_some_and(|r| r <= 1.15)
         });
-        let growth = over(mse(&t.speeds, "V4 GMPA"), mse(&t.speeds, "V1.5 GMPA"));
-        let what = "the error grows with the square of the speed: a ratio 7.1 of squares gives 5.7";
-        full.near("speed", what, growth, 5.7, 0.8);
     }
 
     fn plot(&self, _: &Effort, t: &Mses) -> Plot {
@@ -158,13 +155,7 @@ impl Figure for Fig34 {
         full.no_more()
             .keyed("lost-most", "share of lost tracks", t, |r| r.score.lost);
         let value = |method: &str| mse(t, &format!("40dB-L4 {method}"));
-        let improved = [10, 20, 40, 100].map(|n| value(&format!("improved-{n}")));
-        full.decreasing("improved", "improved message passing gains from particles up to 100", improved);
         full.above("few", "with three particles it loses the target (erratum mpa-9)", value("improved-3"), 4.0);
-        let guided = [3, 10, 40, 500].map(|n| value(&format!("guided-{n}")));
-        full.decreasing("guided", "guided draws gain, too", guided);
-        let enough = over(value("guided-10"), value("guided-500"));
-        full.at_most("ten", "ten draws are enough for a guided filter: 1.6 of the error of 500", enough, 1.75);
         let gap = over(value("grid-31"), value("EKF-U"));
         full.above("gap", "the gap to unquantized ranges never closes with four levels", gap, 10.0);
     }
@@ -219,13 +210,6 @@ impl Figure for Fig35 {
 
     fn claims(&self, _: &Effort, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        for (method, what) in [
-            ("improved-40", "improved message passing"),
-            ("GMPA", "Gaussian message passing"),
-        ] {
-            let values = LEVELS.map(|l| mse(t, &format!("50dB-L{l} {method}")));
-            full.decreasing(format!("levels-{method}"), format!("more levels, less error: {what}"), values);
-        }
         let slope = over(mse(t, "50dB-L4 GMPA"), mse(t, "50dB-L64 GMPA")).map(|ratio| ratio.powf(0.25));
         full.near("slope", "a bit is worth a factor of about four", slope, 3.4, 0.6);
         let what = "four bits are not nearly unquantized with the published encoder (erratum mpa-13)";
