@@ -7,7 +7,7 @@ pub(crate) use crate::reference;
 pub(crate) use crate::schema::{Answer, Field, List};
 pub(crate) use crate::sweep::{distinct, first, joined, product, select};
 pub(crate) use crate::{About, Claims, Context, Cost, Error, Figure, Measured, Quick};
-pub(crate) use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Sensing};
+pub(crate) use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Observed, Sensing, Sign};
 pub(crate) use fewbits_monte_carlo::parallel;
 pub(crate) use fewbits_monte_carlo::{Moments, Stream, Trial};
 pub(crate) use fewbits_plot::{Axis, Layer, Marker, Panel, Plot, points};

@@ -2,8 +2,9 @@
 
 use super::{ERROR, Scene, descent_from, each, sweep, swept};
 use crate::prelude::*;
-use fewbits_baselines::binary_patterns::ConditionalMean;
-use fewbits_baselines::binary_patterns::{AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound};
+use fewbits_baselines::binary_patterns::{
+    AdaptiveRule, ConditionalMean, Luo, adaptive, fixed_threshold, multi_threshold_bound,
+};
 use fewbits_binary_patterns::{Mask, gray_basis};
 
 pub struct Feedback;

@@ -2,7 +2,6 @@
 
 use super::{Scene, pattern, pattern_panel};
 use crate::prelude::*;
-use fewbits_baselines::binary_patterns::count::full_rank_multisets;
 use fewbits_baselines::binary_patterns::{Decoder, count, printed_crlb};
 use fewbits_binary_patterns::Mask;
 use fewbits_binary_patterns::bounds::optimal_weight_van_trees;
@@ -102,7 +101,7 @@ impl Figure for Table {
                 bits,
                 sensors,
                 printed: count::printed_pattern_sets(bits, sensors)? as f64,
-                exact: full_rank_multisets(bits, sensors)? as f64,
+                exact: count::full_rank_multisets(bits, sensors)? as f64,
                 with_gray: count::forced_basis_sets(bits, sensors)? as f64,
             })
         };

@@ -2,7 +2,6 @@
 
 use super::common::{Plant, each};
 use crate::prelude::*;
-use fewbits_core::Sign;
 use fewbits_dymbo::chain::first_message_transient;
 use fewbits_dymbo::{DymboFilter, RoundedSample, ScalarFilter, ScalarPlant, filtered_variance};
 use fewbits_filters::kalman;

@@ -2,7 +2,6 @@
 
 use crate::prelude::*;
 use fewbits_baselines::dymbo::skew_normal::{distance_from_normal, posterior_density};
-use fewbits_core::Sign;
 use fewbits_core::factor::{Factor, Levels};
 use fewbits_numerics::normal::log_pdf_with;
 

@@ -3,9 +3,9 @@
 use super::scores::{self, Row, mse};
 use super::world::{Method, Point};
 use crate::prelude::*;
-use fewbits_baselines::pf_mpa::IntervalRule;
-use fewbits_baselines::pf_mpa::Velocity;
-use fewbits_baselines::pf_mpa::{DynamicsWeight, KernelRule, MessagePassing, ProductSampler, Ring, RingWeight};
+use fewbits_baselines::pf_mpa::{
+    DynamicsWeight, IntervalRule, KernelRule, MessagePassing, ProductSampler, Ring, RingWeight, Velocity,
+};
 
 parameters! {
     pub struct Parameters {

@@ -2,9 +2,8 @@
 
 use super::world::{Field, Method, Point, STEPS, World, canonical};
 use crate::prelude::*;
-use fewbits_baselines::pf_mpa::MessagePassing;
 use fewbits_baselines::pf_mpa::leader::{elect, nearest};
-use fewbits_baselines::pf_mpa::{Reports, Target, Tracker};
+use fewbits_baselines::pf_mpa::{MessagePassing, Reports, Target, Tracker};
 use fewbits_core::{NumberFormat, RoundedGaussian};
 
 parameters! {

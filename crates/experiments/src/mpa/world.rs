@@ -6,7 +6,6 @@ use fewbits_baselines::pf_mpa::{
     Encoder, GuidedGaussian, IntervalRule, Linearised, Network, POSITION, Ranged, RaoBlackwellGuided, Reports, Target,
     Tracker, Velocity, WithManoeuvre,
 };
-use fewbits_core::Observed;
 use fewbits_filters::{BootstrapFilter, ResamplingRule};
 use fewbits_pf_mpa::{GridFilter, QuantizedRange, RangeNoise, RangeSensor};
 

@@ -3,7 +3,7 @@
 use super::models::{Duffing, Fall, Growth, Lorenz, Measure, Pendulum, Straight, Turning, VanDerPol};
 use crate::prelude::*;
 use fewbits_core::factor::{Levels, Scalar};
-use fewbits_core::{Cell, GaussianDynamics, Likelihood, Observed};
+use fewbits_core::{Cell, GaussianDynamics, Likelihood};
 use fewbits_filters::{
     BootstrapFilter, EnsembleFilter, GridFilter, MomentFilter, ResamplingRule, SigmaPointFilter, StateFilter,
 };

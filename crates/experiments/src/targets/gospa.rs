@@ -2,7 +2,6 @@
 
 use super::world::{self, DETECTION, Moment, Reporting, Scenario, Seen};
 use crate::prelude::*;
-use fewbits_core::Observed;
 use fewbits_multi_target::{Gospa, Report, Tracks, gospa};
 
 /// Distance beyond which an estimate is of no target.

@@ -2,7 +2,7 @@
 
 use crate::prelude::*;
 use fewbits_core::factor::{Levels, Scalar, Value};
-use fewbits_core::{Cell, Observed};
+use fewbits_core::Cell;
 use fewbits_models::{AutoSensing, Differentiable, LinearGaussian, Number, constant_velocity_2d};
 use fewbits_multi_target::{Birth, Tracker};
 
