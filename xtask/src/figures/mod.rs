@@ -107,13 +107,19 @@ fn merge(from: &[PathBuf], out: &Path, json: bool) -> Result<Ending, Error> {
         }
     }
     let elapsed = Duration::from_secs_f64(records.iter().map(|r| r.wall_time_s).sum());
-    let summary = write::Summary {
-        out: &out,
-        json,
-        note: "",
-    };
-    summary.write(&records, &Record::read_all(out.path())?, elapsed)?;
-    Ok(summary.print(&records, elapsed))
+    write::write_summary(&out, &records, &Record::read_all(out.path())?, elapsed, "")?;
+    Ok(ending(&out, json, &records, elapsed))
+}
+
+/// Prints the summary and says how a run ended.
+fn ending(out: &write::Directory, json: bool, records: &[Record], elapsed: Duration) -> Ending {
+    let page = if json { summary::json } else { summary::text };
+    print(&page(records, out.path(), elapsed));
+    if records.iter().all(Record::good) {
+        Ending::Good
+    } else {
+        Ending::Failed
+    }
 }
 
 /// Writes the last column of `docs/errata.md` from the claims of a directory, or compares it.
