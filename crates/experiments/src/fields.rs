@@ -113,7 +113,8 @@ macro_rules! limits {
 /// them, without a word in the claims; behind `by "{distance} m" at full_trials` no plain averages are, with fewer trials undecided.
 ///
 /// What a field is in the default plot stands behind its type and unit, with what it is called there: `as panel("ratio {}")`,
-/// `as x("time t")` (several such columns stand together as words), `as key`, `as line("exact")`, `as dashed("bound")`, `as points("simulated")`, `as curve("mean")`. Where there
+/// `as x("time t")` (several such columns stand together as words) or `as ladder` (words below one another, and what is drawn lies
+/// across), `as key`, `as line("exact")`, `as dashed("bound")`, `as points("simulated")`, `as curve("mean")`. Where there
 /// are several panels of one horizontal axis, `as line("exact") in errors` names those of the column. A row within a row has one
 /// role, and a `{}` for each of its columns. [`figure!`](crate::figure!) then draws the rows.
 ///

@@ -22,8 +22,8 @@ parameters! {
 
 rows! {
     pub struct Landing {
-        x: f64 ["V"] => "Source.",
-        f: [f64; BITS] ["V"] => "Estimate with the bit of this number wrong, the coarsest being 1.",
+        x: f64 ["V"] as x("source x / V") => "Source.",
+        f: [f64; BITS] ["V"] as line("bit {} wrong") => "Estimate with the bit of this number wrong, the coarsest being 1.",
     }
 }
 
@@ -70,14 +70,8 @@ impl Figure for Landings {
     }
 
     fn plot(&self, _: &LandingParameters, tables: &Landed) -> Plot {
-        let panel = |bit: usize| {
-            let (x, y) = (Axis::linear("source x / V"), Axis::linear("estimate / V").between(-1.1, 1.1));
-            Panel::new(format!("Bit {} wrong", bit + 1), x, y)
-                .with(Layer::line("", points(&tables.curve, |l| (l.x, l.f[bit]))).coloured(0))
-                .with(Layer::dashed("", vec![(-1.0, -1.0), (1.0, 1.0)]).coloured(7))
-                .without_legend()
-        };
-        Plot::grid(2, (0..BITS).map(panel).collect())
+        let axes: Named<'_> = ("", "", &|title, x| Panel::linear(title, x, "estimate / V"));
+        plotted(&tables.curve, "Where a wrong bit lands", &[axes])
     }
 }
 

@@ -75,14 +75,5 @@ pub(crate) static NO_FEEDBACK: Simulated<Linear, Step> = Simulated {
         let what = "the joint Gaussian belief is as good as the exact filter (difference in squared error, m^2; erratum cfwmd-4)";
         claims.near("joint-is-exact", what, gap, 0.0, 0.01);
     },
-    plot: |_, rows| {
-        let schemes = Axis::categories("", rows.summary.iter().map(|r| r.run.scheme));
-        let all = rows.summary.iter().enumerate();
-        Plot::of(
-            Panel::new("Position error without feedback", schemes, Axis::linear("time-averaged RMSE / m"))
-                .with(Layer::measured("", all, |(i, r)| (i as f64, r.position_rmse)))
-                .without_legend(),
-        )
-    },
     ..Simulated::BASE
 };
