@@ -88,6 +88,8 @@ pub(crate) static FIG8: Simulated<Field, Step> = Simulated {
     simulate: |setting, context| setting.at_budgets(context, "", &FOUR),
     claims: |rows, claims| {
         rows.beat(claims, &[("all", "CFwMD"), ("CFwMD", "CFoMD")], ("", 2.0), &[Part::Position]);
+        let what = "CFoMD has the smaller time-averaged position error than random (ratio)";
+        claims.below("CFoMD-beats-random", what, rows.ratio("CFoMD", "random", 2.0), 1.0);
         let error = |scheme, k| Some(rows.step(scheme, 2.0, k)?.position_rmse.value);
         let first = over(error("all", 1), error("random", 1));
         let what = "in the first step sending everything is worse than random: the truth starts on the prior mean (ratio) (erratum cfwmd-10)";

@@ -71,6 +71,8 @@ impl Figure for PosteriorShape {
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
         let rows = &rows.distances;
+        let what = "the posterior becomes normal as the noise grows";
+        here.decreasing("converges", what, rows.iter().map(|r| r.distance));
         let ratio = rows.windows(2).last().map(|w| w[0].distance / w[1].distance);
         here.near("cubic", "twice the noise, an eighth of the difference (erratum dymbo-11)", ratio, 8.0, 0.01);
     }

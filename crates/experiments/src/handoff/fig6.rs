@@ -197,15 +197,26 @@ impl Figure for Fig6 {
         let full = claims.at_full_trials();
         for smoothing in [Smoothing::Preset, Smoothing::Silverman] {
             let (under, name) = (rows.under(smoothing), smoothing.name());
-            let ml = || under.windows(2).map(|w| w[1].ml_printed.value - w[0].ml_printed.value);
-            let mean = ml().collect::<Moments>().mean();
+            let increments =
+                |of: fn(&Bound) -> f64| under.windows(2).map(move |w| of(w[1]) - of(w[0])).collect::<Vec<_>>();
+            let ml = increments(|b| b.ml_printed.value);
+            let mean = ml.iter().copied().collect::<Moments>().mean();
             let what = "the ML bound grows by the same amount at every step, within 25 %";
-            full.all(format!("{name}-linear"), what, ml(), |d| (d / mean - 1.0).abs() < 0.25);
+            full.all(format!("{name}-linear"), what, &ml, |d| (d / mean - 1.0).abs() < 0.25);
             let what = "at time 1 the KL bound is the smallest and the ML bound the largest";
             claims.all(format!("{name}-first"), what, under.first(), |b| {
                 let [kl, l1] = EXPONENTIAL.map(|(_, log)| log(b));
                 kl < l1 && l1 < b.ml_printed.value.log10()
             });
+            for (measure, log) in EXPONENTIAL {
+                let what = format!("the {measure} bound grows by a factor at every step: exponentially");
+                claims.all(format!("{name}-{measure}-exponential"), what, increments(log), |d| d > 0.15);
+            }
+            let slope =
+                |log: fn(&Bound) -> f64| Some((log(under.last()?) - log(under.first()?)) / (under.len() as f64 - 1.0));
+            let [kl, l1] = EXPONENTIAL.map(|(_, log)| slope(log));
+            let what = "the KL bound grows more slowly than the L1 bound";
+            full.below(format!("{name}-slopes"), what, minus(kl, l1), 0.0);
             let what = "the corrected KL bound is never below the printed one";
             claims.all(format!("{name}-tight"), what, &under, |b| b.log10_kl_corrected >= b.log10_kl_printed.value);
         }

@@ -210,6 +210,13 @@ impl Figure for Fig35 {
 
     fn claims(&self, _: &Effort, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
+        for (method, what) in [
+            ("improved-40", "improved message passing"),
+            ("GMPA", "Gaussian message passing"),
+        ] {
+            let values = LEVELS.map(|l| mse(t, &format!("50dB-L{l} {method}")));
+            full.decreasing(format!("levels-{method}"), format!("more levels, less error: {what}"), values);
+        }
         let slope = over(mse(t, "50dB-L4 GMPA"), mse(t, "50dB-L64 GMPA")).map(|ratio| ratio.powf(0.25));
         full.near("slope", "a bit is worth a factor of about four", slope, 3.4, 0.6);
         let what = "four bits are not nearly unquantized with the published encoder (erratum mpa-13)";
