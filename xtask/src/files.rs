@@ -21,3 +21,16 @@ pub(crate) fn list(path: &Path) -> Result<Vec<PathBuf>, Error> {
     entries.sort();
     Ok(entries)
 }
+
+/// The sources below a folder, in order.
+pub(crate) fn rust_files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let mut files = Vec::new();
+    for path in list(folder)? {
+        if path.is_dir() {
+            files.extend(rust_files(&path)?);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            files.push(path);
+        }
+    }
+    Ok(files)
+}

@@ -4,10 +4,9 @@
 //! `pub fn`, `pub struct`, `pub enum`, `pub trait`, `pub const`, `pub static` or `pub type`, whether or not its module is public.
 
 use crate::Error;
-use crate::files::{list, read};
+use crate::files::{list, read, rust_files};
 use clap::Args;
-use std::ops::AddAssign;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Options of `cargo xtask size`.
 #[derive(Debug, Clone, Args)]
@@ -16,25 +15,9 @@ pub struct Options {
     pub crates: Vec<String>,
 }
 
-/// Counts of one crate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-struct Size {
-    files: usize,
-    code: usize,
-    documentation: usize,
-    comments: usize,
-    public: usize,
-}
-
-impl AddAssign for Size {
-    fn add_assign(&mut self, other: Self) {
-        self.files += other.files;
-        self.code += other.code;
-        self.documentation += other.documentation;
-        self.comments += other.comments;
-        self.public += other.public;
-    }
-}
+/// Counts of one crate: files, then lines of each kind, and public items among the lines of code.
+type Size = [usize; 5];
+const KINDS: [&str; 5] = ["files", "code", "docs", "comments", "public"];
 
 /// Prints the table.
 ///
@@ -42,45 +25,34 @@ impl AddAssign for Size {
 /// If a file cannot be read, or no crate has a given name.
 pub fn run(options: &Options) -> Result<bool, Error> {
     let folders = list(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates"))?;
-    let name = |folder: &Path| folder.file_name().map(|name| name.to_string_lossy().into_owned());
-    let names: Vec<String> = folders.iter().filter_map(|folder| name(folder)).collect();
+    let name = |folder: &PathBuf| folder.file_name().map(|name| name.to_string_lossy().into_owned());
+    let names: Vec<String> = folders.iter().filter_map(name).collect();
     Error::check_crates(&options.crates, &names.iter().map(String::as_str).collect::<Vec<_>>())?;
-    println!("{:20}{:>7}{:>8}{:>8}{:>10}{:>8}", "crate", "files", "code", "docs", "comments", "public");
-    let row = |name: &str, size: &Size| {
-        let Size {
-            files,
-            code,
-            documentation,
-            comments,
-            public,
-        } = size;
-        println!("{name:20}{files:7}{code:8}{documentation:8}{comments:10}{public:8}");
-    };
+    let row = |name: &str, cells: &[String]| println!("{name:20}{}", cells.concat());
+    let counted = |size: &Size| size.map(|count| format!("{count:10}"));
+    row("crate", &KINDS.map(|kind| format!("{kind:>10}")));
     let mut sum = Size::default();
     for (folder, name) in folders.iter().zip(&names) {
         if options.crates.is_empty() || options.crates.contains(name) {
-            let size = of_folder(&folder.join("src"))?;
-            row(name, &size);
-            sum += size;
+            let mut size = Size::default();
+            for path in rust_files(&folder.join("src"))? {
+                if path.file_stem().is_some_and(|stem| stem != "tests") {
+                    add(&mut size, &of_text(&read(&path)?));
+                }
+            }
+            row(name, &counted(&size));
+            add(&mut sum, &size);
         }
     }
-    row("sum", &sum);
+    row("sum", &counted(&sum));
     Ok(true)
 }
 
-fn of_folder(folder: &Path) -> Result<Size, Error> {
-    let mut size = Size::default();
-    for path in list(folder)? {
-        if path.is_dir() {
-            size += of_folder(&path)?;
-        } else if path.extension().is_some_and(|e| e == "rs") && path.file_stem().is_some_and(|stem| stem != "tests") {
-            size += of_text(&read(&path)?);
-        }
-    }
-    Ok(size)
+fn add(sum: &mut Size, more: &Size) {
+    sum.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
 }
 
-/// Beginnings of lines that declare a public item.
+/// Beginnings of lines that declare a public item, behind `pub`.
 const PUBLIC: [&str; 8] = [
     "fn ",
     "const fn ",
@@ -93,10 +65,8 @@ const PUBLIC: [&str; 8] = [
 ];
 
 fn of_text(text: &str) -> Size {
-    let mut size = Size {
-        files: 1,
-        ..Size::default()
-    };
+    let mut size = [1, 0, 0, 0, 0];
+    let [_, code, documentation, comments, public] = &mut size;
     let mut lines = text.lines();
     while let Some(line) = lines.next() {
         if line == "#[cfg(test)]" {
@@ -108,17 +78,14 @@ fn of_text(text: &str) -> Size {
             continue;
         }
         let line = line.trim();
-        if line.is_empty() {
-            continue;
-        }
         if line.starts_with("///") || line.starts_with("//!") {
-            size.documentation += 1;
+            *documentation += 1;
         } else if line.starts_with("//") {
-            size.comments += 1;
-        } else {
-            size.code += 1;
+            *comments += 1;
+        } else if !line.is_empty() {
+            *code += 1;
             let declared = line.strip_prefix("pub ");
-            size.public += usize::from(declared.is_some_and(|rest| PUBLIC.iter().any(|kind| rest.starts_with(kind))));
+            *public += usize::from(declared.is_some_and(|rest| PUBLIC.iter().any(|kind| rest.starts_with(kind))));
         }
     }
     size
@@ -126,19 +93,12 @@ fn of_text(text: &str) -> Size {
 
 #[cfg(test)]
 mod tests {
-    use super::{Size, of_text};
+    use super::of_text;
 
     #[test]
     fn lines_are_counted_by_kind() {
         let text = "//! A.\n\nuse a::b;\n/// F.\npub fn f() {\n    // Why.\n    g();\n}\n#[cfg(test)]\nmod other;\n\
                     fn g() {}\n#[cfg(test)]\nmod tests {\n    pub fn h() {}\n}\npub(crate) struct S;\n";
-        let expected = Size {
-            files: 1,
-            code: 6,
-            documentation: 2,
-            comments: 1,
-            public: 1,
-        };
-        assert_eq!(of_text(text), expected);
+        assert_eq!(of_text(text), [1, 6, 2, 1, 1]);
     }
 }

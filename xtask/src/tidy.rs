@@ -12,9 +12,9 @@ pub(crate) mod errata;
 mod files;
 
 use crate::Error;
-use crate::files::{list, read};
+use crate::files::{list, read, rust_files};
 use cargo_metadata::{DependencyKind, MetadataCommand, Package};
-use fewbits_experiments::all;
+use fewbits_experiments::ids;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -110,18 +110,6 @@ fn short(name: &str) -> &str {
     name.strip_prefix("fewbits-").unwrap_or(name)
 }
 
-fn rust_files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
-    let mut files = Vec::new();
-    for path in list(folder)? {
-        if path.is_dir() {
-            files.extend(rust_files(&path)?);
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            files.push(path);
-        }
-    }
-    Ok(files)
-}
-
 /// Floors by crate, from the rows `| floor | `name` ... |` of the architecture table.
 fn floors(architecture: &str) -> BTreeMap<String, u32> {
     let mut floors = BTreeMap::new();
@@ -167,7 +155,7 @@ fn manifest_problems<'a>(
 
 /// Figure ids that the docs name and the registry lacks, or the other way round.
 fn figure_problems(root: &Path) -> Result<Vec<String>, Error> {
-    let registered: BTreeSet<String> = all().iter().map(|figure| figure.about().id.to_owned()).collect();
+    let registered: BTreeSet<String> = ids().into_iter().map(str::to_owned).collect();
     let systems: BTreeSet<&str> = registered.iter().filter_map(|id| id.split('-').next()).collect();
     let mut documented = BTreeSet::new();
     for path in list(&root.join("docs"))?.into_iter().chain([root.join("README.md")]) {

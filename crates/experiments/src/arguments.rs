@@ -134,29 +134,17 @@ impl Limits {
             (Some(low), None) => Some(format!("at least {low} entries")),
         }
     }
+}
 
-    /// Why a number, a list or its entries are not within the limits.
-    fn refusal(&self, value: &Json, path: &str, nested: bool) -> Option<Refusal> {
-        let outside = |x: f64, low, high, what: &str| {
-            let reason = match (low, high) {
-                (Some(low), _) if x < low => format!("{what}lower than {}", shown(low)),
-                (_, Some(high)) if x > high => format!("{what}greater than {}", shown(high)),
-                _ => return None,
-            };
-            let path = path.to_owned();
-            Some(Refusal { path, reason })
-        };
-        match value {
-            Json::Number(x) => outside(x.as_f64()?, self.low, self.high, ""),
-            Json::Array(list) => {
-                let (least, most) = self.length.filter(|_| !nested).unwrap_or_default();
-                let entry = |(i, value)| self.refusal(value, &format!("{path}[{i}]"), true);
-                outside(list.len() as f64, least, most, "length is ")
-                    .or_else(|| list.iter().enumerate().find_map(entry))
-            }
-            _ => None,
-        }
-    }
+/// Why a number, or the length of a list, is not within limits.
+fn outside(path: &str, x: f64, what: &str, limits: (Option<f64>, Option<f64>)) -> Option<Refusal> {
+    let reason = match limits {
+        (Some(low), _) if x < low => format!("{what}lower than {}", shown(low)),
+        (_, Some(high)) if x > high => format!("{what}greater than {}", shown(high)),
+        _ => return None,
+    };
+    let path = path.to_owned();
+    Some(Refusal { path, reason })
 }
 
 impl Parameter {
@@ -190,20 +178,23 @@ impl Parameter {
         all
     }
 
-    /// Why a value of the parameter is refused.
-    fn refusal(&self, value: &Json, path: &str) -> Option<Refusal> {
-        let of_point = |point: &Json, path: &str| {
-            let of = |field: &Self| field.refusal(point.get(&field.name)?, &format!("{path}.{}", field.name));
-            self.points.iter().find_map(of)
-        };
-        let inside = || match value {
+    /// Why a value of the parameter is refused, or an entry of it, whose own length has no limits.
+    fn refusal(&self, value: &Json, path: &str, is_entry: bool) -> Option<Refusal> {
+        match value {
+            Json::Number(x) => outside(path, x.as_f64()?, "", (self.limits.low, self.limits.high)),
             Json::Array(list) => {
-                let mut entries = list.iter().enumerate();
-                entries.find_map(|(i, point)| of_point(point, &format!("{path}[{i}]")))
+                let length = self.limits.length.filter(|_| !is_entry).unwrap_or_default();
+                let entry = |(i, value)| self.refusal(value, &format!("{path}[{i}]"), true);
+                outside(path, list.len() as f64, "length is ", length)
+                    .or_else(|| list.iter().enumerate().find_map(entry))
             }
-            other => of_point(other, path),
-        };
-        self.limits.refusal(value, path, false).or_else(inside)
+            Json::Object(point) => {
+                let path = |field: &Self| format!("{path}.{}", field.name);
+                let of = |field: &Self| field.refusal(point.get(&field.name)?, &path(field), false);
+                self.points.iter().find_map(of)
+            }
+            _ => None,
+        }
     }
 }
 
@@ -218,7 +209,7 @@ pub(crate) fn described<P: Argument>(defaults: &Map<String, Json>) -> Vec<Parame
 
 /// Refuses values beyond their limits.
 pub(crate) fn within(described: &[Parameter], values: &Map<String, Json>) -> Result<(), Refusal> {
-    let of = |p: &Parameter| p.refusal(values.get(&p.name)?, &p.name);
+    let of = |p: &Parameter| p.refusal(values.get(&p.name)?, &p.name, false);
     described.iter().find_map(of).map_or(Ok(()), Err)
 }
 

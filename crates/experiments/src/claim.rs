@@ -9,7 +9,7 @@
 
 mod compare;
 
-pub use compare::{Cell, Keyed, find, minus, over};
+pub use compare::{find, minus, over};
 
 use crate::measured::Measured;
 use crate::schema::Value;

@@ -86,7 +86,7 @@ macro_rules! parameters {
             }
         }
 
-        $crate::rows! { @fields $name [] $($field: $type [] [] concat!("" $(, $doc)* $(, $meaning)?),)* }
+        $crate::rows! { @fields $name [] [] $($field: $type [] [] concat!("" $(, $doc)* $(, $meaning)?),)* }
     };
 }
 
@@ -113,7 +113,8 @@ macro_rules! limits {
 /// them, without a word in the claims; behind `by "{distance} m" at full_trials` no plain averages are, with fewer trials undecided.
 ///
 /// What a field is in the default plot stands behind its type and unit, with what it is called there: `as panel("ratio {}")`,
-/// `as x("time t")` (several such columns stand together as words), `as key`, `as line("exact")`, `as dashed("bound")`, `as points("simulated")`, `as curve("mean")`. Where there
+/// `as x("time t")` (several such columns stand together as words) or `as ladder` (words below one another, and what is drawn lies
+/// across), `as key`, `as line("exact")`, `as dashed("bound")`, `as points("simulated")`, `as curve("mean")`. Where there
 /// are several panels of one horizontal axis, `as line("exact") in errors` names those of the column. A row within a row has one
 /// role, and a `{}` for each of its columns. [`figure!`](crate::figure!) then draws the rows.
 ///
@@ -139,7 +140,7 @@ macro_rules! limits {
 /// ```
 #[macro_export]
 macro_rules! rows {
-    (@fields $name:ident [$($key:tt $($effort:ident)?)?]
+    (@fields $name:ident [$($key:tt $($effort:ident)?)?] $names:tt
         $($field:ident: $type:ty [$($unit:tt)?] [$($role:ident $($label:literal)? [$($panel:ident)*])?] $meaning:expr,)*) => {
         impl $crate::schema::Field for $name {
             fn describe(row: $crate::Column, to: &mut $crate::schema::Described) {
@@ -157,8 +158,7 @@ macro_rules! rows {
             }
 
             $(fn found_by(&self) -> Option<String> {
-                const _: &str = stringify!($key);
-                Some($crate::claim::Keyed::key(self))
+                Some($crate::rows!(@key self $key $names))
             }
 
             $(fn at_full_trials() -> bool {
@@ -166,23 +166,14 @@ macro_rules! rows {
             })?)?
         }
     };
-    (@keyed $name:ident [] [$($field:ident)*]) => {};
-    (@keyed $name:ident [$key:ident] [$($field:ident)*]) => {
-        impl $crate::claim::Keyed for $name {
-            fn key(&self) -> String {
-                $key(self)
-            }
-        }
+    (@key $row:ident $key:ident $fields:tt) => {
+        $key($row)
     };
-    (@keyed $name:ident [$key:literal] [$($field:ident)*]) => {
-        impl $crate::claim::Keyed for $name {
-            #[allow(unused_variables)]
-            fn key(&self) -> String {
-                let Self { $($field),* } = self;
-                format!($key)
-            }
-        }
-    };
+    (@key $row:ident $key:literal [$($field:ident)*]) => {{
+        #[allow(unused_variables)]
+        let Self { $($field),* } = $row;
+        format!($key)
+    }};
     ($(
         $(#[$outer:meta])*
         $visible:vis struct $name:ident $(by $key:tt $(at $effort:ident)?)? {
@@ -190,14 +181,13 @@ macro_rules! rows {
                 $(as $role:ident $(($label:literal))? $(in $($panel:ident)+)?)? $(=> $meaning:literal)?,)*
         }
     )*) => {$(
-        $crate::rows! { @keyed $name [$($key)?] [$($field)*] }
         $(#[$outer])*
         $visible struct $name {
             $($(#[doc = $doc])* $(#[doc = $meaning])? $shown $field: $type,)*
         }
 
         $crate::rows! {
-            @fields $name [$($key $($effort)?)?]
+            @fields $name [$($key $($effort)?)?] [$($field)*]
             $($field: $type [$($unit)?] [$($role $($label)? [$($($panel)+)?])?] concat!("" $(, $doc)* $(, $meaning)?),)*
         }
     )*};

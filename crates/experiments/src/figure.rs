@@ -146,8 +146,8 @@ pub trait Figure: Sync {
     /// If a computation fails or the run is cancelled.
     fn run(&self, parameters: &Self::Parameters, context: &Context<'_>) -> Result<Self::Tables, Error>;
 
-    /// Judges the rows.
-    fn claims(&self, parameters: &Self::Parameters, tables: &Self::Tables, claims: &mut Claims);
+    /// Judges the rows beyond what their references say. The default says nothing more.
+    fn claims(&self, _: &Self::Parameters, _: &Self::Tables, _: &mut Claims) {}
 
     /// Draws the rows.
     fn plot(&self, parameters: &Self::Parameters, tables: &Self::Tables) -> Plot;

@@ -53,6 +53,11 @@ pub use measured::Measured;
 pub use picture::plotted;
 pub use schema::{Column, Table, Value};
 
+/// The ids of all figures, in their order.
+pub fn ids() -> Vec<&'static str> {
+    all().iter().map(|figure| figure.about().id).collect()
+}
+
 macro_rules! figures {
     ($($system:ident: $($module:ident::$figure:ident),+;)+) => {
         /// Every figure and table, in the order of the publications.

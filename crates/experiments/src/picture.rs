@@ -1,6 +1,7 @@
 //! The default plot of a table: its columns' roles say what is drawn.
 
 use crate::schema::{Column, Field, Role, Table, Value};
+use crate::words::in_words;
 use fewbits_plot::{Axis, Layer, Panel, Plot};
 
 /// A panel by the name that its columns give it (none for the only one), its heading, and its axes from a title and the name of the
@@ -41,24 +42,28 @@ pub fn plotted<T: Field>(tables: &T, title: &str, named: &[Named<'_>]) -> Plot {
 struct Picture<'a> {
     table: &'a Table,
     named: Named<'a>,
-    /// What stands on a horizontal axis of words, in order; empty for numbers.
+    /// What its columns are drawn over: [`Role::x`] or [`Role::ladder`].
+    over: Role,
+    /// What stands on an axis of words, in order; empty for numbers.
     places: Vec<String>,
 }
 
 impl<'a> Picture<'a> {
     fn of(table: &'a Table, named: &Named<'a>) -> Self {
+        let has = |role: Role| table.columns.iter().any(|column| column.role == role);
         let mut picture = Self {
             table,
             named: *named,
+            over: if has(Role::ladder) { Role::ladder } else { Role::x },
             places: Vec::new(),
         };
         // Words stand in their order, and so do the values of several columns together.
         let named = |row: &Vec<Value>| {
-            let mut cells = picture.cells(Role::x, row);
+            let mut cells = picture.cells(picture.over, row);
             matches!(cells.next(), Some((_, Value::Text(_)))) || cells.next().is_some()
         };
         if table.rows.iter().any(named) {
-            picture.places = picture.values_of(Role::x, &table.rows);
+            picture.places = picture.values_of(picture.over, &table.rows);
         }
         picture
     }
@@ -76,21 +81,24 @@ impl<'a> Picture<'a> {
         columns.filter(|(_, column)| is_drawn(column)).map(|(i, _)| i).collect()
     }
 
-    /// Whether there is a horizontal axis and a column to draw.
+    /// Whether there is something to draw, and over what.
     fn is_drawn(&self) -> bool {
-        self.table.columns.iter().any(|column| column.role == Role::x) && !self.drawn().is_empty()
+        self.table.columns.iter().any(|column| column.role == self.over) && !self.drawn().is_empty()
     }
 
     /// The panel of one value of the panel columns.
     fn panel(&self, title: &str, value: &str) -> Panel {
         let (_, heading, panel) = self.named;
-        let words: Vec<&str> = [heading, value].into_iter().filter(|word| !word.is_empty()).collect();
+        let (heading, of) = (heading.to_owned(), in_words(value));
+        let words: Vec<String> = [heading, of].into_iter().filter(|word| !word.is_empty()).collect();
         let title = match (words.as_slice(), self.named.0) {
             ([], "") => title.to_owned(),
             (words, _) => words.join(", "),
         };
-        let mut panel = panel(title, self.named(Role::x));
-        if !self.places.is_empty() {
+        let mut panel = panel(title, self.named(self.over));
+        if self.over == Role::ladder {
+            panel.x = std::mem::replace(&mut panel.y, Axis::ladder(&self.places));
+        } else if !self.places.is_empty() {
             panel.x = Axis::categories(panel.x.label, &self.places);
         }
         self.draw(&mut panel, value);
@@ -192,10 +200,12 @@ impl<'a> Picture<'a> {
 
     /// The column `i` of rows as layers; none where it has no value.
     fn layer(&self, label: String, i: usize, rows: &[&[Value]]) -> Vec<Layer> {
-        let columns = &self.table.columns;
+        let (columns, lies) = (&self.table.columns, self.over == Role::ladder);
         let mark = |row: &&[Value]| {
             let cell = self.table.measured(row, i)?;
-            Some(((self.place(row)?, cell.value), cell.error()))
+            let (place, value) = (self.place(row)?, cell.value);
+            let at = if lies { (value, -place) } else { (place, value) };
+            Some((at, cell.error()))
         };
         let (points, errors): (Vec<_>, Vec<_>) = rows.iter().filter_map(mark).unzip();
         let layers = match columns[i].role {
@@ -205,6 +215,7 @@ impl<'a> Picture<'a> {
                 Layer::line("", points.clone()),
                 Layer::points(label, points).with_errors(errors),
             ],
+            _ if lies => vec![Layer::points(label, points).with_errors(errors).lying()],
             _ => vec![Layer::points(label, points).with_errors(errors)],
         };
         layers.into_iter().filter(|layer| !layer.is_empty()).collect()
@@ -212,9 +223,9 @@ impl<'a> Picture<'a> {
 
     fn place(&self, row: &[Value]) -> Option<f64> {
         if self.places.is_empty() {
-            return self.cells(Role::x, row).next()?.1.number();
+            return self.cells(self.over, row).next()?.1.number();
         }
-        let own = self.value(Role::x, row);
+        let own = self.value(self.over, row);
         let place = self.places.iter().position(|place| *place == own);
         place.map(|place| place as f64)
     }

@@ -40,6 +40,8 @@ pub enum Role {
     panel,
     /// The horizontal axis.
     x,
+    /// Names lines below one another; what is drawn lies across.
+    ladder,
     /// Each of its values has a curve.
     key,
     /// Drawn as a solid line.

@@ -1,4 +1,4 @@
-//! What is drawn in a panel: lines, points, bars, fields, boxes, bands and texts, each with its entry in the legend.
+//! What is drawn in a panel: lines, points, fields, boxes, bands and texts, each with its entry in the legend.
 
 /// A value that is drawn as a mark, perhaps with an error bar.
 pub trait Mark {
@@ -94,13 +94,6 @@ pub enum Shape {
         marker: Option<Marker>,
         /// Whether error bars lie horizontally.
         sideways: bool,
-    },
-    /// Vertical bars from zero (from the lower limit on a log axis), `width` wide in units of the horizontal axis.
-    Bars {
-        /// Centre and height.
-        points: Vec<(f64, f64)>,
-        /// Width.
-        width: f64,
     },
     /// A coloured field over a rectangular grid, with a colour bar: `values[j][i]` at `(x[i], y[j])`.
     Heat {
@@ -217,11 +210,6 @@ impl Layer {
         [line, Self::measured("", marks, |mark| mark)].map(|layer| layer.coloured(colour))
     }
 
-    /// Vertical bars.
-    pub fn bars(label: impl Into<String>, points: Vec<(f64, f64)>, width: f64) -> Self {
-        Self::new(label, Shape::Bars { points, width })
-    }
-
     /// A coloured field of values, line by line; the label stands at its colour bar.
     pub fn heat(label: impl Into<String>, x: Vec<f64>, y: Vec<f64>, values: impl IntoIterator<Item = f64>) -> Self {
         let mut values = values.into_iter();
@@ -252,7 +240,7 @@ impl Layer {
     /// Whether it has no points.
     pub fn is_empty(&self) -> bool {
         match &self.shape {
-            Shape::Line { points, .. } | Shape::Points { points, .. } | Shape::Bars { points, .. } => points.is_empty(),
+            Shape::Line { points, .. } | Shape::Points { points, .. } => points.is_empty(),
             Shape::Heat { values, .. } => values.is_empty(),
             Shape::Boxes { boxes } => boxes.is_empty(),
             Shape::Band { limits } => limits.is_empty(),

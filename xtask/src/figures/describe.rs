@@ -21,12 +21,7 @@ pub(super) fn list(figures: &[&'static dyn AnyFigure], quick: bool) -> String {
 pub(super) fn one(figure: &dyn AnyFigure) -> String {
     let about = figure.about();
     let mut page = format!("{}: {}\n\n", about.id, about.title);
-    let source = if about.source.is_empty() {
-        String::new()
-    } else {
-        format!(" ({})", about.source)
-    };
-    wrap(&mut page, "  ", &format!("{}{source}", about.caption));
+    wrap(&mut page, "  ", &format!("{}{}", about.caption, between(" (", about.source, ")")));
     let parameters = figure.parameters();
     if !parameters.is_empty() {
         page.push_str("\nparameters (--set NAME=VALUE)\n");
@@ -48,15 +43,18 @@ pub(super) fn one(figure: &dyn AnyFigure) -> String {
             name, unit, meaning, ..
         } in &table.columns
         {
-            let unit = if unit.is_empty() {
-                String::new()
-            } else {
-                format!(" [{unit}]")
-            };
-            wrap(&mut page, "  ", &format!("{name}{unit}: {meaning}"));
+            wrap(&mut page, "  ", &format!("{name}{}: {meaning}", between(" [", unit, "]")));
         }
     }
     page
+}
+
+/// A text between marks; nothing of an empty one.
+pub(super) fn between(open: &str, text: &str, close: &str) -> String {
+    match text {
+        "" => String::new(),
+        text => format!("{open}{text}{close}"),
+    }
 }
 
 /// A long list by its beginning and end.
@@ -74,18 +72,15 @@ fn shortened(list: &str) -> String {
 
 /// Appends words in lines of at most 100 characters.
 fn wrap(page: &mut String, indent: &str, text: &str) {
-    let mut line = indent.to_owned();
+    let mut lines = vec![indent.to_owned()];
     for word in text.split_whitespace() {
-        if line.chars().count() + word.chars().count() > 100 && line != indent {
-            page.push_str(line.trim_end());
-            page.push('\n');
-            line = format!("{indent}  ");
+        let line = lines.last().map_or(0, |line| line.chars().count());
+        match lines.last_mut() {
+            Some(last) if line + word.chars().count() <= 100 || last == indent => *last += &format!("{word} "),
+            _ => lines.push(format!("{indent}  {word} ")),
         }
-        line.push_str(word);
-        line.push(' ');
     }
-    if line.trim() != "" {
-        page.push_str(line.trim_end());
-        page.push('\n');
+    for line in lines.iter().filter(|line| !line.trim().is_empty()) {
+        let _ = writeln!(page, "{}", line.trim_end());
     }
 }

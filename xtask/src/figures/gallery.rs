@@ -62,10 +62,7 @@ struct Section<'a> {
 
 /// What failed in this run, then each system with its figures in their order; those of earlier runs last.
 fn sections<'a>(records: impl Iterator<Item = &'a Record>, this_run: &BTreeSet<String>) -> Vec<Section<'a>> {
-    let order: Vec<&str> = fewbits_experiments::all()
-        .iter()
-        .map(|figure| figure.about().id)
-        .collect();
+    let order = fewbits_experiments::ids();
     let place = |r: &Record| order.iter().position(|id| *id == r.id).unwrap_or(order.len());
     let mut records: Vec<(Standing, &Record)> = records.map(|r| (Standing::of(r, this_run), r)).collect();
     records.sort_by_key(|(standing, r)| (*standing == Standing::Earlier, place(r)));

@@ -107,13 +107,19 @@ fn merge(from: &[PathBuf], out: &Path, json: bool) -> Result<Ending, Error> {
         }
     }
     let elapsed = Duration::from_secs_f64(records.iter().map(|r| r.wall_time_s).sum());
-    let summary = write::Summary {
-        out: &out,
-        json,
-        note: "",
-    };
-    summary.write(&records, &Record::read_all(out.path())?, elapsed)?;
-    Ok(summary.print(&records, elapsed))
+    write::write_summary(&out, &records, &Record::read_all(out.path())?, elapsed, "")?;
+    Ok(ending(&out, json, &records, elapsed))
+}
+
+/// Prints the summary and says how a run ended.
+fn ending(out: &write::Directory, json: bool, records: &[Record], elapsed: Duration) -> Ending {
+    let page = if json { summary::json } else { summary::text };
+    print(&page(records, out.path(), elapsed));
+    if records.iter().all(Record::good) {
+        Ending::Good
+    } else {
+        Ending::Failed
+    }
 }
 
 /// Writes the last column of `docs/errata.md` from the claims of a directory, or compares it.
@@ -122,10 +128,7 @@ fn errata(from: &Path, check: bool) -> Result<Ending, Error> {
     let tests = tidy::errata::tests(&in_workspace(Path::new(".")))?;
     let path = in_workspace(Path::new("docs/errata.md"));
     let page = files::read(&path)?;
-    let ids: Vec<&'static str> = fewbits_experiments::all()
-        .iter()
-        .map(|figure| figure.about().id)
-        .collect();
+    let ids = fewbits_experiments::ids();
     let new = errata::written(&page, &tests, |row| {
         let shows = |id: &&&'static str| match records.get(**id) {
             Some(record) => record

@@ -6,8 +6,8 @@ use super::ranks::{Order, Ranks};
 use super::record::Record;
 use super::select::Job;
 use super::times::expected_seconds;
-use super::write::{Directory, Made, Summary};
-use super::{Ending, Options, reuse};
+use super::write::{Directory, Made, write_summary};
+use super::{Ending, Options, ending, reuse};
 use crate::Error;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -196,14 +196,12 @@ impl Run<'_> {
             0 => String::new(),
             missing => format!("Stopped by the user: {missing} of {asked} figures were not made."),
         };
-        let summary = Summary {
-            out: self.out,
-            json: self.options.json,
-            note: &note,
-        };
         let records: Vec<Record> = finished.records.values().cloned().collect();
-        let written = summary.write(&records, &finished.all, elapsed);
-        let ending = summary.print(&records, elapsed);
+        let written = write_summary(self.out, &records, &finished.all, elapsed, &note);
+        let ending = ending(self.out, self.options.json, &records, elapsed);
+        if !note.is_empty() {
+            eprintln!("{note}");
+        }
         written?;
         Ok(if missing > 0 { Ending::Interrupted } else { ending })
     }

@@ -4,8 +4,8 @@ use super::options::Options;
 use super::produce::Maker;
 use super::record::Record;
 use super::select::Job;
-use super::write::{Directory, Summary};
-use super::{Ending, summary};
+use super::write::Directory;
+use super::{Ending, ending, summary};
 use clap::Parser;
 use fewbits_experiments::plot::{Layer, Panel, Plot};
 use fewbits_experiments::{About, AnyFigure, Claims, Context, Error, Figure, Verdict, parameters, plotted, rows};
@@ -147,12 +147,7 @@ fn each_of_five_faults_fails_the_gate() {
         // The run says which, and fails.
         let records = [record];
         let page = summary::text(&records, out.path(), Duration::ZERO);
-        let summary = Summary {
-            out: &out,
-            json: false,
-            note: "",
-        };
-        let ending = summary.print(&records, Duration::ZERO);
+        let ending = ending(&out, false, &records, Duration::ZERO);
         let expected = if fault == Fault::Nothing {
             Ending::Good
         } else {

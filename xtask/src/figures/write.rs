@@ -1,7 +1,8 @@
 //! Files: each is written under a temporary name and then renamed, so that none is ever half-written.
 
+use super::describe::between;
 use super::record::{Record, check_sum};
-use super::{Ending, gallery, print, summary};
+use super::{gallery, summary};
 use crate::Error;
 use fewbits_experiments::{Outcome, Table};
 use fewbits_plot::{Axis, Layer, Panel, Plot, Scale, Shape};
@@ -132,7 +133,7 @@ impl Made {
 fn blank(plot: &Plot) -> Option<String> {
     let shows = |axis: &Axis, value: f64| value.is_finite() && (axis.scale == Scale::Linear || value > 0.0);
     let is_seen = |panel: &Panel, layer: &Layer| match &layer.shape {
-        Shape::Line { points, .. } | Shape::Points { points, .. } | Shape::Bars { points, .. } => {
+        Shape::Line { points, .. } | Shape::Points { points, .. } => {
             points.iter().any(|(x, y)| shows(&panel.x, *x) && shows(&panel.y, *y))
         }
         Shape::Heat { values, .. } => values.iter().flatten().any(|value| value.is_finite()),
@@ -155,48 +156,19 @@ fn to_csv(table: &Table) -> Result<String, csv::Error> {
     String::from_utf8(bytes).map_err(|error| std::io::Error::other(error).into())
 }
 
-/// What a run leaves besides its figures: the gallery, and the summary as text and on standard output.
-pub(super) struct Summary<'a> {
-    pub(super) out: &'a Directory,
-    /// Whether standard output gets JSON.
-    pub(super) json: bool,
-    /// What a reader must know first; empty for nothing.
-    pub(super) note: &'a str,
-}
-
-impl Summary<'_> {
-    /// Writes `index.html` and `summary.txt`: `records` are those of this run, `all` those of the directory.
-    pub(super) fn write(
-        &self,
-        records: &[Record],
-        all: &BTreeMap<String, Record>,
-        elapsed: Duration,
-    ) -> Result<(), Error> {
-        let this_run: BTreeSet<String> = records.iter().map(|r| r.id.clone()).collect();
-        let page = gallery::page(all.values(), &this_run, self.note);
-        self.out.write("index.html", page.as_bytes())?;
-        let text = summary::text(records, self.out.path(), elapsed);
-        let note = if self.note.is_empty() {
-            String::new()
-        } else {
-            format!("{}\n", self.note)
-        };
-        self.out.write("summary.txt", format!("{note}{text}").as_bytes())
-    }
-
-    /// Prints the summary.
-    pub(super) fn print(&self, records: &[Record], elapsed: Duration) -> Ending {
-        let page = if self.json { summary::json } else { summary::text };
-        print(&page(records, self.out.path(), elapsed));
-        if !self.note.is_empty() {
-            eprintln!("{}", self.note);
-        }
-        if records.iter().all(Record::good) {
-            Ending::Good
-        } else {
-            Ending::Failed
-        }
-    }
+/// Writes `index.html` and `summary.txt`: `records` are those of this run, `all` those of the directory; `note` is what a reader must
+/// know first.
+pub(super) fn write_summary(
+    out: &Directory,
+    records: &[Record],
+    all: &BTreeMap<String, Record>,
+    elapsed: Duration,
+    note: &str,
+) -> Result<(), Error> {
+    let this_run: BTreeSet<String> = records.iter().map(|r| r.id.clone()).collect();
+    out.write("index.html", gallery::page(all.values(), &this_run, note).as_bytes())?;
+    let text = summary::text(records, out.path(), elapsed);
+    out.write("summary.txt", format!("{}{text}", between("", note, "\n")).as_bytes())
 }
 
 #[cfg(test)]

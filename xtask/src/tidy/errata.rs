@@ -1,9 +1,8 @@
 //! Errata and what shows them cite each other.
 
-use super::rust_files;
 use crate::Error;
 use crate::errata::{add_tests, cited, rows};
-use crate::files::{list, read};
+use crate::files::{list, read, rust_files};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 

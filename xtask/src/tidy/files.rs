@@ -2,9 +2,8 @@
 //!
 //! Files that break a rule today stand in `allowed.txt`. An entry that is no longer needed is a problem too, so the list only shrinks.
 
-use super::rust_files;
 use crate::Error;
-use crate::files::read;
+use crate::files::{read, rust_files};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -244,32 +243,27 @@ fn defined(
     Some(at)
 }
 
-/// Sets of more than one file that all reach each other.
-fn circles(graph: &BTreeMap<Module, BTreeSet<Module>>) -> Vec<Vec<&Module>> {
-    let reached = |from: &Module| {
-        let (mut seen, mut pending) = (BTreeSet::new(), vec![from.clone()]);
-        while let Some(next) = pending.pop() {
-            for other in graph.get(&next).into_iter().flatten() {
-                if seen.insert(other.clone()) {
-                    pending.push(other.clone());
-                }
-            }
-        }
-        seen
-    };
-    let reach: BTreeMap<&Module, BTreeSet<Module>> = graph.keys().map(|module| (module, reached(module))).collect();
-    let mut found: Vec<Vec<&Module>> = Vec::new();
-    for module in graph.keys().filter(|module| reach[module].contains(*module)) {
-        if found.iter().all(|circle| !circle.contains(&module)) {
-            found.push(
-                graph
-                    .keys()
-                    .filter(|o| reach[module].contains(*o) && reach[*o].contains(module))
-                    .collect(),
-            );
-        }
+/// The files that a file reaches by imports of imports.
+fn reached<'a>(graph: &'a BTreeMap<Module, BTreeSet<Module>>, from: &'a Module) -> BTreeSet<&'a Module> {
+    let (mut seen, mut pending) = (BTreeSet::new(), vec![from]);
+    while let Some(next) = pending.pop() {
+        pending.extend(
+            graph
+                .get(next)
+                .into_iter()
+                .flatten()
+                .filter(|other| seen.insert(*other)),
+        );
     }
-    found
+    seen
+}
+
+/// Sets of more than one file that all reach each other.
+fn circles(graph: &BTreeMap<Module, BTreeSet<Module>>) -> BTreeSet<Vec<&Module>> {
+    let reach: BTreeMap<_, _> = graph.keys().map(|module| (module, reached(graph, module))).collect();
+    let both = |a: &Module, b: &Module| reach[a].contains(b) && reach[b].contains(a);
+    let circle = |module| graph.keys().filter(|other| both(module, other)).collect();
+    graph.keys().filter(|module| both(module, module)).map(circle).collect()
 }
 
 #[cfg(test)]

@@ -86,11 +86,6 @@ impl Figure for Clipping {
         let errors = errors.map(|(rule, mse)| Rule { rule, mse }).into();
         Ok(Clipped { cells, errors })
     }
-
-    fn claims(&self, _: &ClippingParameters, tables: &Clipped, claims: &mut Claims) {
-        let what = "the cell never decreases with the measurement";
-        claims.all("monotone", what, tables.cells.windows(2), |w| w[1].cell >= w[0].cell);
-    }
 }
 
 rows! {
@@ -258,6 +253,5 @@ impl Figure for Response {
             let nearest = rows.iter().min_by(|a, b| (a.x - *t).abs().total_cmp(&(b.x - *t).abs()));
             nearest.is_some_and(|r| (r.p1 - 0.5).abs() <= 2e-3)
         });
-        claims.all("probabilities", "all values are probabilities", rows, |r| (0.0..=1.0).contains(&r.p1));
     }
 }

@@ -28,8 +28,6 @@ pub(crate) static FIG3: Simulated<Linear, Step> = Simulated {
         rows.beat(claims, &[("CFoMD", "random")], ("", 1.0), &[Part::Position]);
         let rate = rows.at("CFwMD", 1.0).map(|r| r.rate);
         claims.within("rate-exact", "without feedback the rate is exactly the budget", rate, 1.0, 4.0);
-        let gain = rows.ratio("CFwMD", "CFoMD", 1.0).map(|r| 1.0 - r);
-        claims.near("gain", "using silence lowers the position RMSE by a tenth", gain, 0.105, 0.025);
     },
     ..Simulated::BASE
 };
@@ -76,15 +74,6 @@ pub(crate) static NO_FEEDBACK: Simulated<Linear, Step> = Simulated {
             .map(|p| p.position.value);
         let what = "the joint Gaussian belief is as good as the exact filter (difference in squared error, m^2; erratum cfwmd-4)";
         claims.near("joint-is-exact", what, gap, 0.0, 0.01);
-    },
-    plot: |_, rows| {
-        let schemes = Axis::categories("", rows.summary.iter().map(|r| r.run.scheme));
-        let all = rows.summary.iter().enumerate();
-        Plot::of(
-            Panel::new("Position error without feedback", schemes, Axis::linear("time-averaged RMSE / m"))
-                .with(Layer::measured("", all, |(i, r)| (i as f64, r.position_rmse)))
-                .without_legend(),
-        )
     },
     ..Simulated::BASE
 };

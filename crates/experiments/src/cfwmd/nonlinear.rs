@@ -9,7 +9,6 @@ use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::Observed;
 use fewbits_densities::Particles;
 use fewbits_filters::{BootstrapFilter, Resampling, ResamplingRule, Schedule};
 use fewbits_models::{LinearGaussian, ReceivedPower, constant_velocity_2d};

@@ -3,13 +3,14 @@
 use super::{Claims, Expected};
 use crate::measured::Measured;
 use crate::reference;
-use crate::schema::Table;
+use crate::schema::{Field, Table};
+use fewbits_plot::Mark;
 
 impl Claims {
     /// One claim for each reference `<figure>/<quantity>/<key>`: the row of that key has that value, within the reference's
     /// tolerance or, where it has a standard error, within four combined standard errors. A reference whose row is absent
     /// fails. References hold at the paper's setting only.
-    pub fn references<R, V: Cell>(
+    pub fn references<R, V: Mark>(
         &self,
         quantity: &str,
         statement: &str,
@@ -33,12 +34,10 @@ impl Claims {
         let here = self.at_defaults();
         for (key, known) in known {
             let found = rows.iter().find(|(name, _)| name == key);
-            let found = found.and_then(|(_, value)| value.measured());
-            let own = found.and_then(|found| found.standard_error).unwrap_or(0.0);
-            let tolerance = known.tolerance + 4.0 * known.standard_error.unwrap_or(0.0).hypot(own);
+            let (number, own) = found.and_then(|(_, value)| value.mark()).unzip();
+            let tolerance = known.tolerance + 4.0 * known.standard_error.unwrap_or(0.0).hypot(own.unwrap_or(0.0));
             let id = format!("{quantity}/{key}").replace(' ', "-");
             let statement = format!("{statement}, {key}");
-            let number = found.map(|found| found.value);
             if self.one_sided {
                 let statement = format!("{statement}: no more than the reference {}", known.value);
                 here.at_most(id, statement, number, known.value + tolerance);
@@ -49,14 +48,14 @@ impl Claims {
     }
 
     /// As [`Claims::references`], of rows that name their own keys.
-    pub fn keyed<'r, R: Keyed + 'r, V: Cell>(
+    pub fn keyed<'r, R: Field + 'r, V: Mark>(
         &self,
         quantity: &str,
         statement: &str,
         rows: impl IntoIterator<Item = &'r R>,
         value: impl Fn(&R) -> V,
     ) {
-        self.references(quantity, statement, rows, |row| (row.key(), value(row)));
+        self.references(quantity, statement, rows, |row| (row.found_by().unwrap_or_default(), value(row)));
     }
 
     /// The references of this quantity stand in a column beside ours, and are not met: nothing is compared with them.
@@ -113,47 +112,17 @@ fn cells(table: &Table, i: usize) -> impl Iterator<Item = (String, Option<Measur
     rows.map(move |(key, row)| (key.clone().unwrap_or_default(), table.measured(row, i)))
 }
 
-/// A row that is found by a name: what follows the quantity in the keys of its references. `rows!` writes it.
-pub trait Keyed {
-    /// The name.
-    fn key(&self) -> String;
-}
-
 /// The row of this name.
-pub fn find<'r, R: Keyed>(rows: &'r [R], key: &str) -> Option<&'r R> {
-    rows.iter().find(|row| row.key() == key)
-}
-
-/// What a reference can be compared with: a number, perhaps missing, perhaps with a standard error.
-pub trait Cell {
-    /// The number with its standard error.
-    fn measured(&self) -> Option<Measured>;
-}
-
-impl Cell for f64 {
-    fn measured(&self) -> Option<Measured> {
-        Some(Measured::new(*self, None))
-    }
-}
-
-impl Cell for Measured {
-    fn measured(&self) -> Option<Measured> {
-        Some(*self)
-    }
+pub fn find<'r, R: Field>(rows: &'r [R], key: &str) -> Option<&'r R> {
+    rows.iter().find(|row| row.found_by().as_deref() == Some(key))
 }
 
 /// The first number over the second, where both are there.
-pub fn over(first: impl Cell, second: impl Cell) -> Option<f64> {
-    Some(first.measured()?.value / second.measured()?.value)
+pub fn over(first: impl Mark, second: impl Mark) -> Option<f64> {
+    Some(first.mark()?.0 / second.mark()?.0)
 }
 
 /// The first number minus the second, where both are there.
-pub fn minus(first: impl Cell, second: impl Cell) -> Option<f64> {
-    Some(first.measured()?.value - second.measured()?.value)
-}
-
-impl<T: Cell> Cell for Option<T> {
-    fn measured(&self) -> Option<Measured> {
-        self.as_ref()?.measured()
-    }
+pub fn minus(first: impl Mark, second: impl Mark) -> Option<f64> {
+    Some(first.mark()?.0 - second.mark()?.0)
 }

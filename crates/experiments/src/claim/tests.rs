@@ -88,17 +88,12 @@ fn references_are_found_by_key_and_fail_where_the_row_is_absent_or_off() {
     assert_eq!(judge(vec![("other", 1.0), ("lloyd-x", 0.130_486_15)]), Verdict::Pass);
     assert_eq!(judge(vec![("lloyd-x", 0.130_487)]), Verdict::Fail);
     assert_eq!(judge(vec![("other", 0.130_486_15)]), Verdict::Fail);
-    struct Named(f64);
-    impl Keyed for Named {
-        fn key(&self) -> String {
-            "lloyd-x".to_owned()
-        }
-    }
-    let one_sided = |value: f64| {
+    let one_sided = |mse: f64| {
         let claims = Claims::about("mi-table4-3", true, true);
+        let method = "lloyd-x";
         claims
             .no_more()
-            .keyed("mse", "squared error", &[Named(value)], |row| Some(row.0));
+            .keyed("mse", "squared error", &[Design { method, mse }], |row| Some(row.mse));
         let of = |c: Claim| (c.id == "mse/lloyd-x").then_some(c.verdict);
         claims.made().into_iter().find_map(of).unwrap()
     };

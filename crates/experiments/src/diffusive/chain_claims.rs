@@ -1,15 +1,11 @@
 //! Claims of figures 3, 4, 7 to 10.
 
-use super::summary::{Curve, Rows, Summary};
+use super::summary::{Curve, Rows};
 use crate::Claims;
-use crate::claim::{Keyed, minus};
-
-fn find<'a>(rows: &'a Rows, key: &str) -> Option<&'a Summary> {
-    rows.summary.iter().find(|s| s.key() == key)
-}
+use crate::claim::{find, minus};
 
 fn nodes(rows: &Rows, key: &str) -> Option<f64> {
-    Some(find(rows, key)?.nodes_median?.value)
+    Some(find(&rows.summary, key)?.nodes_median?.value)
 }
 
 fn at<'a>(rows: &'a Rows, scheme: &str, range: f64, step: usize) -> Option<&'a Curve> {
@@ -19,11 +15,11 @@ fn at<'a>(rows: &'a Rows, scheme: &str, range: f64, step: usize) -> Option<&'a C
 
 fn calibrated(rows: &Rows, claims: &mut Claims, key: &str) {
     let full = claims.at_full_trials();
-    let nees = find(rows, key).and_then(|s| s.nees_median);
+    let nees = find(&rows.summary, key).and_then(|s| s.nees_median);
     let what = "the exact belief is calibrated: the median squared error is 1.39 covariances";
     full.near("calibrated", what, nees, 1.386, 0.4);
     // A small determinant allows a long thin belief: a metre along it is no error of the belief.
-    let wrong = find(rows, key).map(|s| s.converged_wrong.value);
+    let wrong = find(&rows.summary, key).map(|s| s.converged_wrong.value);
     let what = "at most one in a hundred exact beliefs converges more than a metre off (erratum diffusive-15)";
     full.at_most("exact-is-right", what, wrong, 0.01);
 }
@@ -32,7 +28,9 @@ fn calibrated(rows: &Rows, claims: &mut Claims, key: &str) {
 pub(super) fn fig3(rows: &Rows, claims: &mut Claims) {
     let full = claims.at_full_trials();
     for key in ["exact 15", "exact 10", "gmm-4 15", "gmm-4 10"] {
-        let end = find(rows, key).and_then(|s| s.final_err_median).map(|m| m.value);
+        let end = find(&rows.summary, key)
+            .and_then(|s| s.final_err_median)
+            .map(|m| m.value);
         let what = format!("the search ends at the source: {key}");
         full.below(format!("arrives/{}", key.replace(' ', "-")), what, end, 0.1);
     }
@@ -44,7 +42,7 @@ pub(super) fn fig3(rows: &Rows, claims: &mut Claims) {
     let what = "after six nodes 15 m of range are ahead of 10 m";
     full.below("range", what, minus(error(15.0, 6), error(10.0, 6)), 0.0);
     calibrated(rows, claims, "exact 15");
-    let wrong = find(rows, "gaussian known rate 15").map(|s| s.wrong.value);
+    let wrong = find(&rows.summary, "gaussian known rate 15").map(|s| s.wrong.value);
     let what = "one Gaussian stops more than a metre off in a good part of the searches; the paper shows none (erratum diffusive-12)";
     full.at_least("gaussian-is-often-wrong", what, wrong, 0.1);
 }
@@ -58,7 +56,7 @@ pub(super) fn fig4(rows: &Rows, claims: &mut Claims) {
         full.below(format!("range/{}", scheme.replace(' ', "-")), what, minus(wide, narrow), 0.0);
     }
     let what = "the printed 14 nodes are below almost every single-Gaussian search (erratum diffusive-12)";
-    let lowest = find(rows, "gaussian known rate 15").and_then(|s| s.nodes_q10);
+    let lowest = find(&rows.summary, "gaussian known rate 15").and_then(|s| s.nodes_q10);
     paper.above("printed-14", what, lowest, 14.0);
     calibrated(rows, claims, "exact 15");
 }
@@ -81,7 +79,7 @@ pub(super) fn fig7(rows: &Rows, claims: &mut Claims) {
     let what = "and no sharper than the exact belief with the rate known";
     paper.at_least("det5/honest", what, minus(value(lpg), value("exact known rate")), 0.0);
     let what = "which they have a right to: their median squared error is 1.39 covariances";
-    let nees = find(rows, "lpg-2x5 known rate 15").and_then(|s| s.nees_median);
+    let nees = find(&rows.summary, "lpg-2x5 known rate 15").and_then(|s| s.nees_median);
     full.near("det5/calibrated", what, nees, 1.386, 0.4);
     paper.near("det5/gaussian", "log10 det after five nodes, one Gaussian", value("gaussian known rate"), 3.6, 1.0);
     calibrated(rows, claims, "exact 15");
@@ -93,8 +91,7 @@ pub(super) fn fig8(rows: &Rows, claims: &mut Claims) {
     let median = |key: &str| nodes(rows, &format!("{key} 15"));
     let lpg = "lpg-2x5 known rate";
     let what = "the paper's single search with polynomial Gaussians, 7 nodes, is between the deciles of ours";
-    let bands = || rows.summary.iter().filter(|s| s.key() == "lpg-2x5 known rate 15");
-    full.all("printed-7", what, bands(), |s| {
+    full.all("printed-7", what, find(&rows.summary, "lpg-2x5 known rate 15"), |s| {
         s.nodes_q10.is_some_and(|low| low <= 7.0) && s.nodes_q90.is_some_and(|high| high >= 7.0)
     });
     let what = "polynomial Gaussians take no more than one node beyond the exact belief";
@@ -110,7 +107,7 @@ pub(super) fn fig8(rows: &Rows, claims: &mut Claims) {
     }
     let what = "a mixture of 23 numbers is as good, within a node, as 52 of polynomial Gaussians (erratum diffusive-9)";
     full.at_most("mixtures-do", what, minus(median("gmm-4 known rate"), median(lpg)), 1.0);
-    let wrong = find(rows, "mode and curvature known rate 15").map(|s| s.wrong.value);
+    let wrong = find(&rows.summary, "mode and curvature known rate 15").map(|s| s.wrong.value);
     let what = "mode and curvature report convergence in the wrong place in most searches: never trust a determinant from them";
     full.at_least("curvature-misleads", what, wrong, 0.5);
     calibrated(rows, claims, "exact 15");
@@ -119,7 +116,7 @@ pub(super) fn fig8(rows: &Rows, claims: &mut Claims) {
 /// Both examples in wind.
 pub(super) fn wind(rows: &Rows, claims: &mut Claims) {
     let full = claims.at_full_trials();
-    let reach = |key: &str| find(rows, key).map(|s| s.reach.value);
+    let reach = |key: &str| find(&rows.summary, key).map(|s| s.reach.value);
     for (rule, id) in [
         ("covariance 15", "covariance-first"),
         ("information 15", "information-first"),
@@ -127,7 +124,7 @@ pub(super) fn wind(rows: &Rows, claims: &mut Claims) {
         let what = format!("in wind the rule reaches the threshold more often than Mahalanobis: {rule}");
         full.above(id, what, minus(reach(rule), reach("mahalanobis 15")), 0.1);
     }
-    let error = |key: &str| find(rows, key).and_then(|s| s.err_after_3).map(|m| m.value);
+    let error = |key: &str| find(&rows.summary, key).and_then(|s| s.err_after_3).map(|m| m.value);
     for other in ["covariance 15", "mahalanobis 15"] {
         let id = format!("information-after-3/{}", other.replace(' ', "-"));
         let what = format!("after three nodes information has the smaller median error than {other}");

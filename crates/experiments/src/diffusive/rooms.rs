@@ -30,20 +30,20 @@ rows! {
     }
 
     struct Found {
-        case: String => "Air, noise, report and number of readings.",
+        case: String as x("case") => "Air, noise, report and number of readings.",
         /// Share of the placements whose most probable cell is within two cells of the source.
-        within_two_cells: Measured,
-        coverage: Measured => "Share of the 90 per cent credible regions that hold the source.",
+        within_two_cells: Measured as points("true geometry") in shares,
+        coverage: Measured as points("90 % regions that hold it") in shares => "Share of the 90 per cent credible regions that hold the source.",
         false_alarms: Measured => "Share of the placements in which the true geometry is said to be wrong.",
-        free_within_two_cells: Measured => "As the first, if free space is assumed.",
+        free_within_two_cells: Measured as points("free space") in shares => "As the first, if free space is assumed.",
         /// Of the placements in which free space misses, the share in which it is said to be wrong.
         free_misses_flagged: Measured,
     }
 
     struct Visit {
-        sensors: usize => "Sensors visited.",
-        error: Measured ["m"] => "Median distance of the most probable cell from the source.",
-        error_free: Measured ["m"] => "The same if free space is assumed.",
+        sensors: usize as x("sensors visited") => "Sensors visited.",
+        error: Measured ["m"] as points("true geometry") in visits => "Median distance of the most probable cell from the source.",
+        error_free: Measured ["m"] as points("free space") in visits => "The same if free space is assumed.",
     }
 
     struct Square {
@@ -194,21 +194,17 @@ impl Figure for Rooms {
                 .with(Layer::points("sensors", places(|s| s.sensor)).styled(1, Marker::Circle))
                 .with(Layer::points("source", places(|s| s.source)).styled(3, Marker::Triangle))
         };
-        let visits =
-            Panel::new("Distance to the source", Axis::log("sensors visited"), Axis::linear("median distance / m"))
-                .with(Layer::measured("true geometry", &rows.visits, |v| (v.sensors as f64, v.error)))
-                .with(Layer::measured("free space", &rows.visits, |v| (v.sensors as f64, v.error_free)));
-        let names = Axis::categories("case", rows.found.iter().map(|row| &row.case));
-        let of = |f: fn(&Found) -> Measured| points(rows.found.iter().enumerate(), |(i, row)| (i as f64, f(row).value));
-        let shares = Panel::new("Within two cells", names, Axis::linear("share").between(0.0, 1.0))
-            .with(Layer::points("true geometry", of(|row| row.within_two_cells)).styled(0, Marker::Square))
-            .with(Layer::points("90 % regions that hold it", of(|row| row.coverage)).styled(2, Marker::Circle))
-            .with(Layer::points("free space", of(|row| row.free_within_two_cells)).styled(1, Marker::Triangle));
         let maps = [
             panel("True geometry", |s| s.belief),
             panel("Free space", |s| s.belief_free),
         ];
-        Plot::grid(2, maps.into_iter().chain([visits, shares]).collect())
+        let visits = |title, x| Panel::semilogx(title, x, "median distance / m");
+        let shares = |title, x| Panel::linear(title, x, "share");
+        let named: [Named<'_>; 2] = [
+            ("visits", "Distance to the source", &visits),
+            ("shares", "Within two cells", &shares),
+        ];
+        Plot::grid(2, maps.into_iter().chain(plotted(rows, "", &named).panels).collect())
     }
 }
 

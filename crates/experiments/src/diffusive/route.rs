@@ -29,13 +29,13 @@ impl Parameters {
 
 rows! {
     pub struct TraceRow {
-        step: usize => "Nodes that have sampled, this one included.",
+        step: usize as x("nodes") => "Nodes that have sampled, this one included.",
         node: usize => "The node.",
         /// The belief is received; the node samples; the belief is updated and its determinant tested; the next node is selected and the
         /// belief sent on, or the search stops.
         event: &'static str,
-        bytes: f64 ["bytes"] => "Bytes that travel.",
-        log10_determinant: Option<f64> => "Decimal logarithm of the determinant, where it is tested.",
+        bytes: f64 ["bytes"] as points("sent and received") in messages => "Bytes that travel.",
+        log10_determinant: Option<f64> as points("after each node") in test => "Decimal logarithm of the determinant, where it is tested.",
     }
 }
 
@@ -44,7 +44,8 @@ pub struct Trace;
 impl Figure for Trace {
     figure!(Parameters => Vec<TraceRow>, "diffusive-fig1", "One search, event by event", "Zhao and Nehorai 2007, Fig. 1",
         "The paper's flow chart as what happens in one search of example B's kind: receive, sample, update, test, \
-         select, send. A mixture of four Gaussians over position and rate travels.");
+         select, send. A mixture of four Gaussians over position and rate travels.";
+        { test: linear("lg det of the covariance / m^4", "Test"), messages: semilog("bytes of a message", "Messages") });
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<TraceRow>, Error> {
         let scheme = Scheme {
@@ -88,21 +89,6 @@ impl Figure for Trace {
         claims.near("one-end", "the search ends once", count("stop") as f64, 1.0, 0.0);
         let last = rows.iter().filter_map(|r| r.log10_determinant).next_back();
         here.below("sharp", "the last determinant is below the threshold", last, A.threshold.log10());
-    }
-
-    fn plot(&self, _: &Parameters, rows: &Vec<TraceRow>) -> Plot {
-        let tests = points(rows, |r| (r.step as f64, r.log10_determinant));
-        let mut total = 0.0;
-        let bytes = select(rows, |r| r.event == "receive")
-            .map(|r| {
-                total += r.bytes;
-                (r.step as f64, total)
-            })
-            .collect();
-        let determinant = Panel::linear("Test", "nodes", "lg det of the covariance / m^4");
-        let sent = Panel::linear("Messages", "nodes", "bytes so far");
-        let determinant = determinant.with(Layer::points("after each node", tests));
-        Plot::grid(2, vec![determinant, sent.with(Layer::points("received", bytes))])
     }
 }
 

@@ -29,12 +29,12 @@ rows! {
     }
 
     struct Successive by "{bits}" {
-        bits: usize => "Bits about the same sample.",
-        batch: f64 => "1 - c of the Lloyd-Max word.",
-        exact_tree: f64 => "1 - c with thresholds at exact means.",
-        claimed: f64 => "1 - c promised by assuming normal densities, (1 - 2/pi)^m.",
-        own_levels: f64 => "1 - c true of its levels.",
-        centroids: f64 => "1 - c true of its cells.",
+        bits: usize as x("bits") => "Bits about the same sample.",
+        batch: f64 as line("Lloyd-Max word") => "1 - c of the Lloyd-Max word.",
+        exact_tree: f64 as points("successive, exact means") => "1 - c with thresholds at exact means.",
+        claimed: f64 as dashed("successive, as claimed") => "1 - c promised by assuming normal densities, (1 - 2/pi)^m.",
+        own_levels: f64 as points("successive, its own levels") => "1 - c true of its levels.",
+        centroids: f64 as points("successive, centroids") => "1 - c true of its cells.",
         empty_words: usize => "Words that no sample causes.",
     }
 }
@@ -99,8 +99,6 @@ impl Figure for WordLength {
         claims.keyed("own-levels", &what("own-levels"), rows, |r| 1.0 - r.own_levels);
         claims.keyed("centroids", &what("centroids"), rows, |r| 1.0 - r.centroids);
         claims.keyed("exact-tree", &what("exact-tree"), rows, |r| 1.0 - r.exact_tree);
-        let what = "the Lloyd-Max word loses less at every length from two bits";
-        claims.all("batch-wins", what, rows.iter().filter(|r| r.bits > 1), |r| r.batch < r.exact_tree);
         let empty = rows.last().map(|r| r.empty_words as f64);
         claims.above("empty", "at five bits some successive words never occur", empty, 0.0);
     }
@@ -115,14 +113,9 @@ impl Figure for WordLength {
                 .with(Layer::line(format!("predicted, {title}"), over(|r| r.riccati_loss)).coloured(i))
                 .with(Layer::points(format!("exact, {title}"), over(|r| r.loss)).coloured(i));
         }
-        let curve = |of: fn(&Successive) -> f64| points(&rows.successive, |r| (r.bits as f64, of(r)));
-        let (x, y) = (Axis::linear("bits").between(0.7, 5.3), Axis::log("fraction of the information lost, 1 - c"));
-        let right = Panel::new("Bits about one sample", x, y)
-            .with(Layer::line("Lloyd-Max word", curve(|r| r.batch)).coloured(2))
-            .with(Layer::points("successive, exact means", curve(|r| r.exact_tree)).coloured(3))
-            .with(Layer::dashed("successive, as claimed", curve(|r| r.claimed)).coloured(4))
-            .with(Layer::points("successive, its own levels", curve(|r| r.own_levels)).styled(4, Marker::Cross))
-            .with(Layer::points("successive, centroids", curve(|r| r.centroids)).styled(5, Marker::Triangle));
-        Plot::grid(2, vec![left, right])
+        let lost = "fraction of the information lost, 1 - c";
+        let right =
+            plotted(&rows.successive, "Bits about one sample", &[("", "", &|title, x| Panel::semilog(title, x, lost))]);
+        Plot::grid(2, [vec![left], right.panels].concat())
     }
 }

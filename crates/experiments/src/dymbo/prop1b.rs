@@ -2,7 +2,6 @@
 
 use crate::prelude::*;
 use fewbits_baselines::dymbo::skew_normal::{distance_from_normal, posterior_density};
-use fewbits_core::Sign;
 use fewbits_core::factor::{Factor, Levels};
 use fewbits_numerics::normal::log_pdf_with;
 
@@ -26,10 +25,10 @@ rows! {
     }
 
     struct Density {
-        theta: f64 ["unit"] => "State.",
-        exact: f64 ["1/unit"] => "Posterior after a +1 at the prior mean.",
-        normal: f64 ["1/unit"] => "Normal density of the same moments.",
-        prior: f64 ["1/unit"] => "Density before.",
+        theta: f64 ["unit"] as x("state") => "State.",
+        exact: f64 ["1/unit"] as line("exact posterior") => "Posterior after a +1 at the prior mean.",
+        normal: f64 ["1/unit"] as dashed("normal, same moments") => "Normal density of the same moments.",
+        prior: f64 ["1/unit"] as dashed("prior") => "Density before.",
     }
 }
 
@@ -76,8 +75,6 @@ impl Figure for PosteriorShape {
         here.decreasing("converges", what, rows.iter().map(|r| r.distance));
         let ratio = rows.windows(2).last().map(|w| w[0].distance / w[1].distance);
         here.near("cubic", "twice the noise, an eighth of the difference (erratum dymbo-11)", ratio, 8.0, 0.01);
-        let constant = rows.last().map(|r| r.cubed);
-        here.near("constant", "constant of the cubic law", constant, 0.0200, 5e-5);
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
@@ -86,12 +83,8 @@ impl Figure for PosteriorShape {
         let distance = Panel::loglog("Distance from normal", x, "largest density difference")
             .with(Layer::dashed("0.02 / sigma^3", p.sigma.iter().map(|s| law(*s)).collect()).coloured(1))
             .with(Layer::points("exact", points(&rows.distances, |r| (r.sigma, r.distance))).coloured(0));
-        let curve = |of: fn(&Density) -> f64| points(&rows.densities, |r| (r.theta, of(r)));
         let title = "Densities at the smallest noise";
-        let densities = Panel::linear(title, "state", "density")
-            .with(Layer::dashed("prior", curve(|r| r.prior)).coloured(2))
-            .with(Layer::line("exact posterior", curve(|r| r.exact)).coloured(0))
-            .with(Layer::dashed("normal, same moments", curve(|r| r.normal)).coloured(1));
-        Plot::grid(2, vec![distance, densities])
+        let densities = plotted(&rows.densities, title, &[("", "", &|title, x| Panel::linear(title, x, "density"))]);
+        Plot::grid(2, [vec![distance], densities.panels].concat())
     }
 }

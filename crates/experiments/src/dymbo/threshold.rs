@@ -2,7 +2,7 @@
 
 use super::common::{Plant, plants};
 use crate::prelude::*;
-use fewbits_core::{Scheme, Sign};
+use fewbits_core::Scheme;
 use fewbits_dymbo::{DymboFilter, ScalarFilter, ScalarPlant};
 use fewbits_filters::assumed_density;
 

@@ -65,10 +65,10 @@ rows! {
         pub(super) outer2: f64 => "Largest breakpoint of sensor 2.",
         pub(super) mi_nats: f64 ["nat"] => "Mutual information between the unknown and all symbols.",
         pub(super) mi_bits: f64 ["bit"] => "The same in bits.",
-        pub(super) mse: f64 => "Mean squared error of the posterior mean, in prior variances.",
+        pub(super) mse: f64 as points("exact") => "Mean squared error of the posterior mean, in prior variances.",
         /// Largest eigenvalue of the criterion's Hessian where it was a joint design.
         pub(super) curvature: Option<f64>,
-        pub(super) printed_mse: Option<f64> => "The publication's squared error.",
+        pub(super) printed_mse: Option<f64> as points("printed") => "The publication's squared error.",
     }
 }
 
@@ -103,27 +103,4 @@ impl Pair {
     pub(super) fn beside(self, printed_mse: Option<f64>) -> Self {
         Self { printed_mse, ..self }
     }
-}
-
-/// Squared errors of designs, one a line.
-pub(super) fn errors<'a>(title: &str, rows: impl Iterator<Item = (String, &'a Pair)>) -> Panel {
-    let rows: Vec<_> = rows.collect();
-    let criteria = [
-        ("mi ", "information, "),
-        ("mse ", "squared error, "),
-        ("lloyd ", "Lloyd-Max, for "),
-    ];
-    let in_words = |name: &String| {
-        let name = name.replace('-', " ");
-        let long = |(short, long): &(&str, &str)| Some(format!("{long}{}", name.strip_prefix(short)?));
-        criteria.iter().find_map(long).unwrap_or(name)
-    };
-    let marks = |of: fn(&Pair) -> Option<f64>| {
-        let place = |(i, (_, pair)): (usize, &(String, &'a Pair))| Some((of(pair)?, -(i as f64)));
-        rows.iter().enumerate().filter_map(place).collect()
-    };
-    let y = Axis::ladder(rows.iter().map(|(name, _)| in_words(name)));
-    Panel::new(title, Axis::linear("mean squared error / prior variances"), y)
-        .with(Layer::points("exact", marks(|pair| Some(pair.mse))))
-        .with(Layer::points("printed", marks(|pair| pair.printed_mse)).marked(Marker::Cross))
 }

@@ -1,11 +1,11 @@
 //! `mpa-ablation`: improved message passing with one erratum put back at a time.
 
-use super::scores::{self, Row, ladder, mse};
+use super::scores::{self, Row, mse};
 use super::world::{Method, Point};
 use crate::prelude::*;
-use fewbits_baselines::pf_mpa::IntervalRule;
-use fewbits_baselines::pf_mpa::Velocity;
-use fewbits_baselines::pf_mpa::{DynamicsWeight, KernelRule, MessagePassing, ProductSampler, Ring, RingWeight};
+use fewbits_baselines::pf_mpa::{
+    DynamicsWeight, IntervalRule, KernelRule, MessagePassing, ProductSampler, Ring, RingWeight, Velocity,
+};
 
 parameters! {
     pub struct Parameters {
@@ -45,7 +45,7 @@ fn variants(n: usize) -> Result<[(&'static str, MessagePassing, IntervalRule); 1
 impl Figure for Ablation {
     figure!(Parameters => Vec<Row>, "mpa-ablation", "Which erratum costs what", "",
         "Improved message passing with one printed choice put back at a time, 50 and 30 dB, four levels. Full rings, the \
-         printed interval and transferred velocities cost most.");
+         printed interval and transferred velocities cost most."; semilog(scores::MSE));
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();
@@ -71,10 +71,5 @@ impl Figure for Ablation {
         let what = "ratio weights of the dynamics only add noise (erratum mpa-4, erratum mpa-16)";
         paper.above("ratios", what, ratio("dynamics ratio"), 1.05);
         paper.near("radius", "the missing radius costs little here (erratum mpa-3)", ratio("uniform ring"), 1.04, 0.12);
-    }
-
-    fn plot(&self, _: &Parameters, t: &Vec<Row>) -> Plot {
-        let panel = |snr: f64| ladder(&format!("{snr} dB"), select(t, |r| r.snr_db == snr));
-        Plot::grid(2, vec![panel(50.0), panel(30.0)])
     }
 }

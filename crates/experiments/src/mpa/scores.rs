@@ -28,11 +28,12 @@ impl Effort {
 
 rows! {
     /// One tracker at one point.
+    #[derive(Clone)]
     pub struct Row by "{point} {method}" at full_trials {
         pub(super) point: String => "Which setting.",
-        pub(super) snr_db: f64 ["dB"] => "Ratio of the powers of range and noise.",
+        pub(super) snr_db: f64 ["dB"] as panel("{} dB") => "Ratio of the powers of range and noise.",
         pub(super) levels: usize => "Levels of the quantizer.",
-        pub(super) method: String => "Tracker and its particles, draws or nodes an axis.",
+        pub(super) method: String as ladder => "Tracker and its particles, draws or nodes an axis.",
         pub(super) family: &'static str => "Kind of tracker.",
         pub(super) size: Option<usize> => "Particles, draws, or nodes an axis.",
         pub(super) score: Score,
@@ -72,20 +73,9 @@ pub(super) fn mse(rows: &[Row], key: &str) -> Option<f64> {
     find(rows, key).map(|r| r.score.mse.value)
 }
 
-/// Means and medians, a tracker a line.
-pub(super) fn ladder<'a>(title: &str, rows: impl IntoIterator<Item = &'a Row>) -> Panel {
-    let rows: Vec<&Row> = rows.into_iter().collect();
-    let y = Axis::ladder(rows.iter().map(|r| r.method.as_str()));
-    let lying = |label: &str, of: fn(&Row) -> Measured| {
-        let marks = rows.iter().enumerate().map(|(i, r)| (of(r).value, -(i as f64)));
-        let errors = rows.iter().map(|r| of(r).error());
-        Layer::points(label, marks.collect())
-            .with_errors(errors.collect())
-            .lying()
-    };
-    Panel::new(title, Axis::log(MSE), y)
-        .with(lying("mean", |r| r.score.mse))
-        .with(lying("median", |r| r.score.median))
+/// Means and medians of some rows, a tracker a line.
+pub(super) fn ladder<'a>(rows: impl Iterator<Item = &'a Row>) -> Plot {
+    plotted(&rows.cloned().collect::<Vec<_>>(), "", &[("", "", &|title, x| Panel::semilog(title, x, MSE))])
 }
 
 /// The Gaussian trackers that linearise.

@@ -6,7 +6,6 @@ use fewbits_baselines::pf_mpa::{
     Encoder, GuidedGaussian, IntervalRule, Linearised, Network, POSITION, Ranged, RaoBlackwellGuided, Reports, Target,
     Tracker, Velocity, WithManoeuvre,
 };
-use fewbits_core::Observed;
 use fewbits_filters::{BootstrapFilter, ResamplingRule};
 use fewbits_pf_mpa::{GridFilter, QuantizedRange, RangeNoise, RangeSensor};
 
@@ -271,9 +270,10 @@ impl Point {
 
 rows! {
     /// What a method did on many trajectories.
+    #[derive(Clone)]
     pub(super) struct Score {
-        pub(super) mse: Measured => "Mean squared position error, averaged over trajectories.",
-        pub(super) median: Measured => "Median over trajectories of their mean squared error.",
+        pub(super) mse: Measured as points("mean") => "Mean squared position error, averaged over trajectories.",
+        pub(super) median: Measured as points("median") => "Median over trajectories of their mean squared error.",
         pub(super) lost: f64 => "Share of trajectories with a mean squared error above 4.",
         pub(super) trajectories: u64 => "Trajectories.",
     }

@@ -7,7 +7,7 @@ use super::receivers::{each, mixed, over_bits};
 use crate::prelude::*;
 use fewbits_baselines::over_bits::Estimator;
 use fewbits_core::factor::Value;
-use fewbits_core::{LinearDynamics, MeasurementNoise, NumberFormat, Observed, Scheme, SensorNode};
+use fewbits_core::{LinearDynamics, MeasurementNoise, NumberFormat, Scheme, SensorNode};
 use fewbits_densities::Mixture;
 use fewbits_filters::kalman;
 use fewbits_handoff::{Coded, HandoffFilter, Leaders};

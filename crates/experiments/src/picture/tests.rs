@@ -164,3 +164,38 @@ fn without_keys_each_column_has_its_colour_and_words_are_places() {
     assert!(matches!(&layers[0].shape, Shape::Points { points, .. } if *points == [(0.0, 1.0), (1.0, 2.0)]));
     assert_eq!((layers.len(), layers[0].label.as_str()), (1, "Cost"));
 }
+
+rows! {
+    struct Rung {
+        kind: &'static str as ladder("{}-{}") => "Kind.",
+        size: u32 as ladder => "Size.",
+        error: Measured as points("error") => "Error.",
+    }
+}
+
+#[test]
+fn names_of_a_ladder_stand_below_one_another_and_values_lie_across() {
+    let rung = |kind, size, error| Rung {
+        kind,
+        size,
+        error: Measured::new(error, 0.5),
+    };
+    let rows = vec![rung("mi", 4, 2.0), rung("mi", 8, 3.0)];
+    let plot = plotted(&rows, "Title", &[("", "", &|title, x| Panel::semilog(title, x, "error"))]);
+    let panel = &plot.panels[0];
+    assert_eq!((panel.x.label.as_str(), panel.x.scale), ("error", fewbits_plot::Scale::Log));
+    assert_eq!(panel.y.names, [(0.0, "mi-4".to_owned()), (-1.0, "mi-8".to_owned())]);
+    let Shape::Points {
+        points,
+        errors,
+        sideways,
+        ..
+    } = &panel.layers[0].shape
+    else {
+        panic!("no points")
+    };
+    assert_eq!(
+        (points.as_slice(), errors.as_slice(), *sideways),
+        (&[(2.0, 0.0), (3.0, -1.0)][..], &[0.5; 2][..], true)
+    );
+}

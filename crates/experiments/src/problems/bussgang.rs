@@ -4,7 +4,7 @@ use super::models::Lorenz;
 use crate::prelude::*;
 use fewbits_baselines::bussgang;
 use fewbits_core::factor::{Levels, Value};
-use fewbits_core::{GaussianDynamics, Observed, OnAxes, Sign, assumed_density};
+use fewbits_core::{GaussianDynamics, OnAxes, assumed_density};
 use fewbits_models::{AutoDynamics, Flow, LinearSensor};
 use nalgebra::Matrix3;
 

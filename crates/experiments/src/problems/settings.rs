@@ -3,7 +3,7 @@
 use super::models::{Duffing, Fall, Growth, Lorenz, Measure, Pendulum, Straight, Turning, VanDerPol};
 use crate::prelude::*;
 use fewbits_core::factor::{Levels, Scalar};
-use fewbits_core::{Cell, GaussianDynamics, Likelihood, Observed};
+use fewbits_core::{Cell, GaussianDynamics, Likelihood};
 use fewbits_filters::{
     BootstrapFilter, EnsembleFilter, GridFilter, MomentFilter, ResamplingRule, SigmaPointFilter, StateFilter,
 };
@@ -28,8 +28,6 @@ struct Problem<const D: usize, const K: usize> {
     scored: Vec<usize>,
 }
 
-/// Filters in the order of the columns.
-pub(super) const FILTERS: [&str; 5] = ["assumed density", "unscented", "ensemble", "grid", "particles"];
 /// Members of the ensemble.
 const MEMBERS: usize = 100;
 /// Particles.

@@ -17,12 +17,12 @@ parameters! {
 
 rows! {
     pub struct Row {
-        column: String => "Signal.",
-        target: f64 => "Packets per sample, at most.",
+        column: String as panel => "Signal.",
+        target: f64 as x("packets per sample") => "Packets per sample, at most.",
         /// adaptive; send-on-delta, which is also DPCM of order 0 without a lattice; dpcm-0, dpcm-1.
-        scheme: &'static str,
+        scheme: &'static str as key,
         delta: f64 => "Half-width of the region of silence.",
-        rmse: f64 => "Root mean square error.",
+        rmse: f64 as curve => "Root mean square error.",
         packets: f64 => "Packets per sample.",
         /// Error over that of the better of both orders of DPCM, whose packets hold a lattice point too; smaller errors than the
         /// negligible one count as that.
@@ -64,8 +64,8 @@ impl Figure for Packets {
     figure!(Parameters => Vec<Row>, "real-packets", "Real signals: error against packets", "our own comparison",
         "Root mean square error against packets per sample. Where a packet costs the same whatever it holds, codes gain \
          nothing: only the prediction counts, and what a packet holds. Send-on-delta sends the sample itself, and is \
-         ahead where signals jump and rest; the bank is ahead where they have a velocity. Errors below a \
-         millionth of the signal's range are drawn there.");
+         ahead where signals jump and rest; the bank is ahead where they have a velocity. An error of zero is not \
+         drawn."; loglog("rms error"));
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let recordings = p.source.load("real-packets", context)?;
@@ -79,21 +79,5 @@ impl Figure for Packets {
         let what = "at equal packets the error is at most that of the better DPCM, in the geometric mean";
         claims.at_most("mean", what, geometric_mean(ratios()), 1.0);
         here.at_most("worst", "and nowhere above 1.35 of it", largest(ratios()), 1.35);
-        claims.all("rate", "the rate is kept", rows.iter().filter(|r| r.ratio.is_some()), |r| r.packets <= r.target);
-    }
-
-    fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
-        let columns = distinct(rows, |r| r.column.clone());
-        let panel = |column: &String| {
-            let curve = |(colour, &scheme): (usize, &&'static str)| {
-                let chosen = rows.iter().filter(|r| r.column == *column && r.scheme == scheme);
-                let curve = points(chosen, |r| (r.target, r.rmse.max(r.negligible)));
-                let layer = if colour == 0 { Layer::line } else { Layer::dashed };
-                layer(scheme, curve).coloured(colour)
-            };
-            let schemes = ["adaptive", "dpcm-0", "dpcm-1", "send-on-delta"];
-            Panel::loglog(column, "packets per sample", "rms error").with_all(schemes.iter().enumerate().map(curve))
-        };
-        Plot::grid(3, columns.iter().map(panel).collect())
     }
 }

@@ -1,8 +1,8 @@
 //! Worlds of several targets among range sensors, and what the sensors report.
 
 use crate::prelude::*;
+use fewbits_core::Cell;
 use fewbits_core::factor::{Levels, Scalar, Value};
-use fewbits_core::{Cell, Observed};
 use fewbits_models::{AutoSensing, Differentiable, LinearGaussian, Number, constant_velocity_2d};
 use fewbits_multi_target::{Birth, Tracker};
 

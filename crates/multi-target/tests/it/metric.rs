@@ -63,7 +63,12 @@ fn the_triangle_inequality_holds_in_every_unit() {
     let mut rng = Stream::new(4).rng();
     for case in 0..200 {
         let sets = [case % 4, case / 4 % 4, case / 16 % 4].map(|count| draw(&mut rng, count));
-        let between = |i: usize, j: usize| gospa(&sets[i], &sets[j], 1.5, 2.0).unwrap().value;
+        let between = |i: usize, j: usize| {
+            let all = gospa(&sets[i], &sets[j], 1.5, 2.0).unwrap();
+            let parts = all.localisation + all.missed + all.false_targets;
+            assert!((parts - all.value * all.value).abs() < 1e-12 * parts.max(1.0), "{parts} of {}", all.value);
+            all.value
+        };
         assert!(between(0, 2) <= between(0, 1) + between(1, 2) + 1e-12);
         for unit in [1e-150, 1e150] {
             let [a, b] = [0, 1].map(|i| sets[i].iter().map(|x: &Vector2<f64>| x * unit).collect::<Vec<_>>());

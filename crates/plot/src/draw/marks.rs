@@ -45,14 +45,7 @@ pub(super) fn draw(frame: &Frame<'_, '_>, layer: &Layer, shades: (f64, f64)) -> 
             }
             Ok(())
         }
-        Shape::Bars { points, width } => {
-            let bars: Vec<_> = points
-                .iter()
-                .map(|p| (p.0 - width / 2.0, p.0 + width / 2.0, 0.0, p.1))
-                .collect();
-            boxes(frame, &bars, ink, 0.8)
-        }
-        Shape::Boxes { boxes: list } => boxes(frame, list, ink, 1.0),
+        Shape::Boxes { boxes: list } => boxes(frame, list, ink),
         Shape::Heat { x, y, values } => field(frame, x, y, values, shades),
         Shape::Band { limits } => {
             let upper = limits.iter().map(|l| (l.0, l.2));
@@ -145,12 +138,12 @@ pub(super) fn names(frame: &Frame<'_, '_>, layers: &[Layer]) -> Drawn {
 }
 
 /// Filled rectangles `(left, right, bottom, top)`, cut at the frame.
-fn boxes(frame: &Frame<'_, '_>, boxes: &[(f64, f64, f64, f64)], ink: RGBColor, opacity: f64) -> Drawn {
+fn boxes(frame: &Frame<'_, '_>, boxes: &[(f64, f64, f64, f64)], ink: RGBColor) -> Drawn {
     for (left, right, bottom, top) in boxes.iter().filter(|b| frame.x.accepts(b.0) && frame.x.accepts(b.1)) {
         let across = |x: f64| frame.across(x).clamp(frame.left, frame.right).round() as i32;
         let down = |y: f64| frame.down_cut(y).round() as i32;
         let corners = [(across(*left), down(*bottom)), (across(*right), down(*top))];
-        frame.area.draw(&Rectangle::new(corners, ink.mix(opacity).filled()))?;
+        frame.area.draw(&Rectangle::new(corners, ink.filled()))?;
     }
     Ok(())
 }
@@ -173,7 +166,7 @@ fn field(frame: &Frame<'_, '_>, x: &[f64], y: &[f64], values: &[Vec<f64>], (low,
             let last = start + run.len() - 1;
             if let Some(shade) = shade(run[0]) {
                 let cell = (left[start], under(&left, last), bottom[j], under(&bottom, j));
-                boxes(frame, &[cell], heat(shade / SHADES), 1.0)?;
+                boxes(frame, &[cell], heat(shade / SHADES))?;
             }
             start = last + 1;
         }
@@ -214,13 +207,6 @@ pub(super) fn extent(layer: &Layer) -> (Vec<f64>, Vec<f64>) {
             }
             (x, y)
         }
-        Shape::Bars { points, width } => (
-            points
-                .iter()
-                .flat_map(|p| [p.0 - width / 2.0, p.0 + width / 2.0])
-                .collect(),
-            points.iter().map(|p| p.1).chain([0.0]).collect(),
-        ),
         Shape::Heat { x, y, .. } => (edges(x), edges(y)),
         Shape::Boxes { boxes } => {
             (boxes.iter().flat_map(|b| [b.0, b.1]).collect(), boxes.iter().flat_map(|b| [b.2, b.3]).collect())

@@ -48,7 +48,6 @@ fn every_shape_leaves_its_elements() {
     assert_eq!(more(Layer::points("", points.clone()).marked(Marker::Triangle), "<polygon"), 3);
     assert!(more(Layer::points("", points.clone()).with_errors(vec![0.5; 3]), "<polyline") >= 3);
     assert!(more(Layer::dashed("", points.clone()), "<polyline") > 10);
-    assert_eq!(more(Layer::bars("", points.clone(), 0.5), "<rect"), 3);
     assert_eq!(more(Layer::boxes("", vec![(0.0, 1.0, 1.0, 2.0)]), "<rect"), 1);
     assert_eq!(more(Layer::band("", vec![(0.0, 1.0, 2.0), (1.0, 2.0, 3.0)]), "<polygon"), 1);
     let heat = Layer::heat("", vec![0.0, 1.0], vec![1.0, 2.0, 3.0], [0.0, 1.0].repeat(3));
