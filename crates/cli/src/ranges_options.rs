@@ -50,6 +50,13 @@ pub(crate) struct RangesOptions {
     /// they are names in that column.
     #[arg(long, value_name = "COLUMNS", value_delimiter = ',')]
     pub(crate) odometry: Vec<String>,
+    /// Column with the name of each row's target, of several in one file: each has a track of its own.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) target: Option<String>,
+    /// Column with the standard deviation of each row's ranges, right in proportion: the noise is estimated beside. Default: one that is called
+    /// so.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) accuracy_column: Option<String>,
     /// Correlation time of the velocity in seconds.
     #[arg(long, default_value_t = 6.0, value_name = "SECONDS")]
     pub(crate) persistence: f64,

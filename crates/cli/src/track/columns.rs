@@ -61,7 +61,7 @@ pub(super) enum Finds {
     Labels,
     /// Also which one has accuracies.
     Levels,
-    /// Which column has the names of anchors, perhaps numbers.
+    /// The same, and the names may be numbers, of anchors.
     Anchors,
 }
 
@@ -157,7 +157,7 @@ impl Roles {
             name != kind.by.as_ref() && name != kind.accuracy.as_ref() && name != kind.threshold.as_ref()
         };
         let free: Vec<usize> = (0..table.names.len()).filter(is_free).collect();
-        if is_whole && kind.finds == Finds::Levels && found.accuracy.is_none() {
+        if is_whole && kind.finds != Finds::Labels && found.accuracy.is_none() {
             let is_beside_one = free.iter().filter(|i| !holds_words(table, **i)).count() == 2;
             let is_said_by = |word: &str| ACCURACIES.contains(&word) || (is_beside_one && ERRORS.contains(&word));
             let is_accuracy = |i: &&usize| {

@@ -68,6 +68,8 @@ pub(super) fn options(track: &TrackOptions, anchors: &str) -> Result<RangesOptio
         height: None,
         unknown_clock: false,
         odometry: Vec::new(),
+        target: None,
+        accuracy_column: track.accuracy_column.clone(),
         persistence: track.persistence,
         outliers: track.outliers,
         silence: RangeSettings::default().silence,

@@ -8,6 +8,7 @@ use super::late::Late;
 use super::own_columns::OwnColumns;
 use super::samples::Samples;
 use super::seconds::Seconds;
+use super::targets::OfTarget;
 use super::transform::Transform;
 use crate::arguments::TableOptions;
 use crate::clock;
@@ -57,6 +58,8 @@ pub(super) struct Instants {
     samples: Option<Samples>,
     /// What is left out of rows because it only repeats.
     held: Option<Held>,
+    /// The rows that are taken, if not all are.
+    only: Option<OfTarget>,
 }
 
 impl Instants {
@@ -122,7 +125,16 @@ impl Instants {
             late: Late::new(kind.late),
             samples: kind.sampled.map(Samples::new),
             held: None,
+            only: None,
         })
+    }
+
+    /// The rows of one target.
+    pub(super) fn only(self, rows: OfTarget) -> Self {
+        Self {
+            only: Some(rows),
+            ..self
+        }
     }
 
     /// The same rows with corrected values, or functions of them.
@@ -312,12 +324,18 @@ impl Instants {
     }
 
     fn read_any_row(&mut self) -> Result<Option<Instant>, Error> {
-        let Some((tick, cells)) = self.table.next(self.base)? else {
-            return Ok(None);
+        let (tick, cells, row) = loop {
+            let Some((tick, cells)) = self.table.next(self.base)? else {
+                return Ok(None);
+            };
+            let tick = tick.unwrap_or(self.next_number);
+            self.next_number = tick.wrapping_add(1);
+            let row = self.table.row();
+            if self.only.as_ref().is_none_or(|only| only.has(row)) {
+                break (tick, cells, row);
+            }
         };
-        let tick = tick.unwrap_or(self.next_number);
-        self.next_number = tick.wrapping_add(1);
-        let (row, may_be_late) = (self.table.row(), self.late.is_waiting());
+        let may_be_late = self.late.is_waiting();
         let (tick, seconds) = self.seconds.of(tick, may_be_late, row, self.table.file());
         let time = clock::shown(tick, self.base);
         if seconds < self.last && !may_be_late {

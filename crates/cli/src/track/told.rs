@@ -67,8 +67,9 @@ pub(super) fn take_told(
             ..settings
         };
         let mut found = height(*settings);
-        // A height that is not known makes errors that depend on the distance too.
-        if let Some((noise, proportional)) = proportion(at(*settings, found)) {
+        // A height that is not known makes errors that depend on the distance too, and rows may state theirs.
+        let grows_by = |settings| proportion(settings).filter(|_| instants.roles.any_accuracy().is_none());
+        if let Some((noise, proportional)) = grows_by(at(*settings, found)) {
             said.push(grows(noise, "taken, as"));
             *settings = RangeSettings {
                 height: settings.height,
