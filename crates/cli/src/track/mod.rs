@@ -95,7 +95,7 @@ use crate::table_options::TableOptions;
 use columns::{Finds, Kind};
 use fewbits_table::names::as_argument;
 use rows::Instants;
-use targets::OfTarget;
+use targets::Target;
 
 /// Runs the task.
 pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {
@@ -159,15 +159,12 @@ pub(crate) fn ranges(options: &RangesOptions) -> Result<Ending, Error> {
         table.columns.extend(options.odometry.iter().cloned());
     }
     let anchors = anchors::read_anchors(&options.anchors)?;
-    let run = |table: &TableOptions, of: Option<(String, OfTarget)>, output: &mut Option<Sheet>| {
+    let run = |table: &TableOptions, of: Option<Target>, output: &mut Option<Sheet>| {
         let mut instants = Instants::open(table, &kind)?;
         let mut options = options.clone();
         options.table.by.clone_from(&instants.roles.by);
-        let (target, rows) = of.unzip();
-        if let Some(rows) = rows {
-            instants = instants.only(rows);
-        }
-        ranges::run(&options, &anchors, instants, target, output)
+        instants.only = of.as_ref().map(|target| target.rows.clone());
+        ranges::run(&options, &anchors, instants, of.as_ref(), output)
     };
     let mut output = None;
     let Some(column) = &options.target else {

@@ -12,6 +12,7 @@ use super::range_summary::{AnchorSummary, OFTEN, Summary, lines};
 use super::report::{first_cell, first_name, summarise};
 use super::rows::Instants;
 use super::sensors;
+use super::targets::Target;
 use super::told::take_told;
 use crate::arguments::RangesOptions;
 use crate::error::Error;
@@ -21,10 +22,13 @@ use crate::output::{Cell, Shape, Sheet};
 use crate::plot::Thinned;
 use crate::report::Report;
 use fewbits_pf_mpa::{RangeEstimate, RangeTracker, Travel};
+use nalgebra::Vector3;
 
 /// Most ranges longer than the anchors are apart by this factor, or shorter, have another unit.
 const LONG: f64 = 8.0;
 const SHORT: f64 = 0.05;
+/// A target is far from the middle of the anchors from so many times their largest distance on.
+const FAR: f64 = 3.0;
 /// Probability below which an anchor whose ranges travel as levels is told to contradict the others.
 const SURELY: f64 = 0.1;
 
@@ -58,12 +62,12 @@ fn cells(found: Option<&RangeEstimate>, axes: usize) -> Vec<Cell> {
 
 /// Runs the task.
 ///
-/// `target`: its name, of several whose rows go into one sheet.
+/// `target`: one of several whose rows go into one sheet.
 pub(super) fn run(
     options: &RangesOptions,
     anchors: &[Anchor],
     mut instants: Instants,
-    target: Option<String>,
+    target: Option<&Target>,
     output: &mut Option<Sheet>,
 ) -> Result<(), Error> {
     let file = &options.anchors;
@@ -81,14 +85,15 @@ pub(super) fn run(
     let mut tracker = RangeTracker::new(anchors.iter().cloned(), travel, settings).map_err(refused)?;
     let known = |name: &str| anchors.iter().position(|(known, _)| known == name);
     let odometry = Odometry::new(options, anchors, &instants)?;
-    let is_stray = |name: &&String| known(name).is_none() && odometry.axis(name).is_none();
+    let is_target = |name: &String| target.is_some_and(|target| target.all.contains(name));
+    let is_stray = |name: &&String| known(name).is_none() && odometry.axis(name).is_none() && !is_target(name);
     if let Some(name) = instants.names.iter().find(is_stray) {
         return Err(unknown(instants.file(), name, file));
     }
     let axes = tracker.coordinates();
     let mut accuracies = Accuracies::of(&mut instants, &options.table.file)?;
     let names = std::iter::once(first_name(&instants).to_owned())
-        .chain(target.as_ref().map(|_| "target".to_owned()))
+        .chain(target.map(|_| "target".to_owned()))
         .chain(columns(axes))
         .collect();
     let sheet = match output {
@@ -96,7 +101,7 @@ pub(super) fn run(
         None => output.insert(Sheet::new(options.output.as_deref(), Shape::of(options.json), names)?),
     };
     let mut summary = Summary {
-        target: target.clone(),
+        target: target.map(|target| target.name.clone()),
         rows: 0,
         ranges: 0,
         bits: 0,
@@ -122,7 +127,8 @@ pub(super) fn run(
     };
     let mut places = Thinned::new();
     let apart = farthest(anchors);
-    let (mut long, mut small) = (0, 0);
+    let middle = anchors.iter().map(|(_, place)| place).sum::<Vector3<f64>>() / anchors.len() as f64;
+    let (mut long, mut small, mut between, mut far) = (0, 0, 0_u64, 0);
     let mut first: Vec<(f64, usize, f64)> = Vec::new();
     let (mut rounding, mut noise) = (0.0, f64::INFINITY);
     while let Some(instant) = instants.next()? {
@@ -141,6 +147,10 @@ pub(super) fn run(
                 continue;
             }
             let Some(anchor) = known(name) else {
+                if is_target(name) {
+                    between += 1;
+                    continue;
+                }
                 return Err(unknown(instants.file(), name, file));
             };
             if range == 0.0 && !options.unknown_clock {
@@ -171,11 +181,17 @@ pub(super) fn run(
             }
             ranges += 1;
         }
+        if found.is_none() && ranges == 0 {
+            // The place that is expected then.
+            let moved = tracker.moved(instant.seconds, &Vector3::zeros());
+            found = moved.map_err(|source| refused_row(&instants, &instant, source))?;
+        }
         summary.rows += 1;
         summary.ranges += ranges;
         match &found {
             Some(found) => {
                 noise = found.noise;
+                far += u64::from((found.position - middle).norm() > FAR * apart);
                 let deviations = [0, 1].map(|i| found.covariance[(i, i)].sqrt());
                 places.push((found.position.xy(), deviations));
                 if found.places > 1 {
@@ -198,7 +214,7 @@ pub(super) fn run(
         }
         let first = first_cell(&instants, instant.time);
         let last = [Cell::Whole(ranges as i64), Cell::Text(events.to_owned())];
-        let label = target.iter().cloned().map(Cell::Text);
+        let label = target.map(|target| Cell::Text(target.name.clone()));
         let cells = cells(found.as_ref(), axes);
         sheet.write(std::iter::once(first).chain(label).chain(cells).chain(last))?;
         if instants.is_live() {
@@ -239,6 +255,18 @@ pub(super) fn run(
     }
     summary.hints.extend(instants.strange_accuracies());
     summary.hints.extend(accuracies.hint(noise));
+    if between > 0 {
+        summary
+            .hints
+            .push(format!("{between} ranges to other targets were left out"));
+    }
+    if 2 * far > summary.rows && options.bias.is_none() {
+        summary.hints.push(
+            "the target is far from the anchors beside what these are apart, where ranges hardly tell bias and scale from the place: state both, as \
+             --bias 0 --scale 0 for calibrated ranges"
+                .to_owned(),
+        );
+    }
     summary.hints.extend(limited(&first));
     if !is_regular(&options.table.file) {
         summary.hints.extend(proportion(anchors, settings, &first));
@@ -265,8 +293,10 @@ pub(super) fn run(
             .push(format!("{} copies of reports were dropped", instants.copies));
     }
     let mut lines = lines(&summary, &tracker, settings, least);
-    if let Some(target) = &target {
-        lines.iter_mut().for_each(|line| *line = format!("{target}: {line}"));
+    if let Some(target) = target {
+        lines
+            .iter_mut()
+            .for_each(|line| *line = format!("{}: {line}", target.name));
     }
     summarise(&summary, &lines, options.json)
 }
@@ -288,6 +318,6 @@ fn refused_row(instants: &Instants, instant: &Instant, source: fewbits_pf_mpa::E
 }
 
 fn unknown(table: &str, name: &str, anchors: &str) -> Error {
-    let mend = "add it there, choose columns with --columns, or name the column of anchors with --by";
+    let mend = "add it there, choose columns with --columns or --odometry, or name the column of anchors with --by";
     Error::content(table, format_args!("`{name}` is no anchor of {anchors}: {mend}"))
 }

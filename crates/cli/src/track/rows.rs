@@ -13,6 +13,7 @@ use super::transform::Transform;
 use crate::arguments::TableOptions;
 use crate::clock;
 use crate::error::Error;
+use crate::files::is_regular;
 use crate::input::Table;
 use fewbits_record::TimeBase;
 use std::collections::VecDeque;
@@ -59,7 +60,7 @@ pub(super) struct Instants {
     /// What is left out of rows because it only repeats.
     held: Option<Held>,
     /// The rows that are taken, if not all are.
-    only: Option<OfTarget>,
+    pub(super) only: Option<OfTarget>,
 }
 
 impl Instants {
@@ -77,6 +78,11 @@ impl Instants {
         };
         let mut table = Table::open_with_time(&chosen, 2)?;
         let roles = Roles::find(&table, kind, chosen.columns.is_empty());
+        if let Some((options, kind)) = roles.narrowed(options, kind).filter(|_| is_regular(&options.file)) {
+            let mut open = Self::open(&options, &kind)?;
+            open.roles.told = roles.told;
+            return Ok(open);
+        }
         if let Some(name) = &roles.by {
             table = table.with_labels(name)?;
         }
@@ -127,14 +133,6 @@ impl Instants {
             held: None,
             only: None,
         })
-    }
-
-    /// The rows of one target.
-    pub(super) fn only(self, rows: OfTarget) -> Self {
-        Self {
-            only: Some(rows),
-            ..self
-        }
     }
 
     /// The same rows with corrected values, or functions of them.
@@ -201,6 +199,15 @@ impl Instants {
     pub(super) fn leave_out_repetitions(&mut self) -> Vec<usize> {
         self.held = Some(Held::begin(&mut self.ahead, self.names.len()));
         self.held.iter().flat_map(Held::sensors).collect()
+    }
+
+    /// The same of repetitions alone, from so many first rows.
+    pub(super) fn leave_out_old(&mut self, count: usize) -> Result<Vec<usize>, Error> {
+        self.peek(count)?;
+        let held = Held::of_repetitions(&mut self.ahead, self.names.len());
+        let found: Vec<usize> = held.sensors().collect();
+        self.held = Some(held).filter(|_| !found.is_empty());
+        Ok(found)
     }
 
     fn read_new(&mut self) -> Result<Option<Instant>, Error> {

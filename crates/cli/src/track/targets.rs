@@ -25,7 +25,16 @@ const MOST: usize = 20;
 /// Targets that are tracked, at most.
 const MOST_TRACKED: usize = 1000;
 
-/// A target of a table: its number, and that of each row.
+/// A target of a table.
+pub(super) struct Target {
+    pub(super) name: String,
+    pub(super) rows: OfTarget,
+    /// The names of all.
+    pub(super) all: Rc<[String]>,
+}
+
+/// The number of a target, and that of each row.
+#[derive(Clone)]
 pub(super) struct OfTarget {
     number: usize,
     rows: Rc<[Option<usize>]>,
@@ -40,7 +49,7 @@ impl OfTarget {
 }
 
 /// The targets that a column of a file names, as they come, with their rows.
-pub(super) fn targets(options: &TableOptions, column: &str) -> Result<Vec<(String, OfTarget)>, Error> {
+pub(super) fn targets(options: &TableOptions, column: &str) -> Result<Vec<Target>, Error> {
     const OPTION: &str = "--target";
     if !is_regular(&options.file) {
         return Err(Error::option(OPTION, column, "a file in place of a pipe, since it is read more than once"));
@@ -65,11 +74,16 @@ pub(super) fn targets(options: &TableOptions, column: &str) -> Result<Vec<(Strin
         }
     }
     let rows: Rc<[Option<usize>]> = rows.into();
-    let of = |(number, name): (usize, String)| {
-        let rows = Rc::clone(&rows);
-        (name, OfTarget { number, rows })
+    let all: Rc<[String]> = names.into();
+    let of = |(number, name): (usize, &String)| Target {
+        name: name.clone(),
+        rows: OfTarget {
+            number,
+            rows: Rc::clone(&rows),
+        },
+        all: Rc::clone(&all),
     };
-    Ok(names.into_iter().enumerate().map(of).collect())
+    Ok(all.iter().enumerate().map(of).collect())
 }
 
 /// The column that names the anchor of each row, if rows are single ranges.

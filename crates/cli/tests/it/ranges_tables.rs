@@ -350,6 +350,95 @@ fn accuracies_of_rows_are_taken_in_proportion() {
     assert!(bits.contains("ranges in full"), "{bits}");
 }
 
+/// A table that is written every 10 s, with old ranges where there is no new one: bands held .69 of the truths.
+#[test]
+fn ranges_that_repeat_and_slow_ones_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let places = [
+        [0.0, 0.0, 0.0],
+        [100.0, 0.0, 0.0],
+        [100.0, 80.0, 0.0],
+        [0.0, 80.0, 0.0],
+        [50.0, 95.0, 0.0],
+    ];
+    anchors(folder.path(), &places, 1.0, false);
+    let mut numbers = Numbers(8);
+    let truth = |row: usize| {
+        let angle = 0.07 * row as f64;
+        [50.0 + 30.0 * angle.sin(), 40.0 + 25.0 * (0.8 * angle).cos(), 0.0]
+    };
+    let (mut last, mut rows) = ([0.0; 5], String::from("time,n0,n1,n2,n3,n4\n"));
+    for row in 0..200 {
+        for (i, last) in last.iter_mut().enumerate() {
+            if row == 0 || numbers.normal() > 0.0 {
+                *last = distance(&places[i], &truth(row)) + 0.2 * numbers.normal();
+            }
+        }
+        rows += &format!("{},{}\n", 10 * row, last.map(|range| format!("{range:.3}")).join(","));
+    }
+    std::fs::write(folder.path().join("t.csv"), &rows).unwrap();
+    let words = ["ranges", "t.csv", "--anchors", "anchors.csv", "--json"];
+    let out = text(&good(folder.path(), &words, b"")).to_owned();
+    let found: Vec<serde_json::Value> = out.lines().map(|row| serde_json::from_str(row).unwrap()).collect();
+    let held = found
+        .iter()
+        .enumerate()
+        .filter(|(row, found)| holds(found, &truth(*row)))
+        .count();
+    assert!(held > 170, "{held}");
+    let told = text(&fewbits(folder.path(), &words[..4], b"").stderr).to_owned();
+    assert!(told.contains("that repeat the one before are left out") && told.contains("--silence 80"), "{told}");
+}
+
+/// The range among other columns, a status in words among them; a row whose range is missing has the place that is expected.
+#[test]
+fn the_column_of_ranges_is_found_among_others() {
+    let folder = tempfile::tempdir().unwrap();
+    anchors(folder.path(), &RECTANGLE, 1.0, false);
+    let truth = [4.0, 2.0, 0.0];
+    let mut rows = String::from("time,anchor,range,state,fp_power\n");
+    for row in 0..100 {
+        let range = distance(&RECTANGLE[row % 4], &truth);
+        let range = if row % 5 == 4 { String::new() } else { range.to_string() };
+        rows += &format!("{},n{},{range},{},-{}\n", 0.1 * row as f64, row % 4, ["ok", "late"][row % 2], 80 + row % 7);
+    }
+    std::fs::write(folder.path().join("t.csv"), &rows).unwrap();
+    let words = ["ranges", "t.csv", "--anchors", "anchors.csv", "--json"];
+    let out = text(&good(folder.path(), &words, b"")).to_owned();
+    let found: Vec<serde_json::Value> = out.lines().map(|row| serde_json::from_str(row).unwrap()).collect();
+    assert!(found.len() == 100 && found[20..].iter().all(|row| holds(row, &truth)), "{out}");
+    let told = text(&fewbits(folder.path(), &words[..4], b"").stderr).to_owned();
+    assert!(
+        told.contains("range is taken for the range") && told.contains("left out: state, fp_power"),
+        "{told}"
+    );
+    let pipe = refused(folder.path(), &["ranges", "-", "--anchors", "anchors.csv"], rows.as_bytes());
+    assert!(pipe.contains("--columns"), "{pipe}");
+}
+
+/// Ranges between two targets are not those of an anchor; and a target far from all anchors is told.
+#[test]
+fn ranges_between_targets_and_far_ones_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    anchors(folder.path(), &RECTANGLE, 1.0, false);
+    let truths = [[4.0, 2.0, 0.0], [120.0, 70.0, 0.0]];
+    let mut rows = String::from("time,tag,anchor,range\n");
+    for row in 0..400 {
+        let (target, step) = (row % 2, row / 2);
+        let (name, place) = match step % 5 {
+            4 => (format!("t{}", 1 - target), truths[1 - target]),
+            anchor => (format!("n{anchor}"), RECTANGLE[anchor]),
+        };
+        rows += &format!("{},t{target},{name},{}\n", 0.1 * step as f64, distance(&place, &truths[target]));
+    }
+    std::fs::write(folder.path().join("t.csv"), rows).unwrap();
+    let told = fewbits(folder.path(), &["ranges", "t.csv", "--anchors", "anchors.csv", "--target", "tag"], b"");
+    let told = text(&told.stderr).to_owned();
+    assert!(told.contains("t0: 40 ranges to other targets were left out"), "{told}");
+    let far = "the target is far from the anchors";
+    assert!(told.contains(&format!("t1: {far}")) && !told.contains(&format!("t0: {far}")), "{told}");
+}
+
 /// Anchors whose names are exchanged, and ranges that are no distances: the mend is told.
 #[test]
 fn mistakes_of_tables_are_told_with_the_mend() {

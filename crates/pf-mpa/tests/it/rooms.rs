@@ -646,6 +646,11 @@ fn mistakes_of_tables_are_found() {
     assert_eq!(found(&anchors, &|_, range| 2.0 * range, &mut noise), Some(Mistake::Doubled));
     assert_eq!(found(&anchors, &|_, range| 100.0 * range, &mut noise), Some(Mistake::Unit(0.01)));
     assert_eq!(found(&anchors, &|_, range| range / 0.149_896_229, &mut noise), Some(Mistake::RoundTrip));
+    // Where an anchor is not heard, nothing is exchanged with it.
+    let mut unheard = anchors.clone();
+    unheard[1].1 = anchors[2].1 + Vector3::new(1.0, 1.0, 0.0);
+    unheard.push(("silent".to_owned(), anchors[1].1));
+    assert_eq!(found(&unheard, &as_they_are, &mut noise), None);
 }
 
 /// Defect: under a height that is not the target's, an anchor was told to be too long or too short.
