@@ -40,7 +40,7 @@ pub(crate) enum Task {
     /// Estimate what sensors measure from a table (CSV) of values, of reports of few bits, or of ranges to anchors: estimates with bands.
     Track(Box<TrackOptions>),
     /// Estimate a place from distances to anchors at known places, in the plane or in space: estimates with bands.
-    Ranges(RangesOptions),
+    Ranges(Box<RangesOptions>),
     /// Calibrate: find noise, offset, gain, drift and delay of each sensor and the change of the level from a table, with standard errors.
     Fit(FitOptions),
     /// Find the room of a leak, its rate and its start from readings of sensors in rooms, of values or of few bits, at any times.

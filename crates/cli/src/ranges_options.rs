@@ -50,15 +50,23 @@ pub(crate) struct RangesOptions {
     /// they are names in that column.
     #[arg(long, value_name = "COLUMNS", value_delimiter = ',')]
     pub(crate) odometry: Vec<String>,
-    /// Correlation time of the velocity in seconds.
-    #[arg(long, default_value_t = 6.0, value_name = "SECONDS")]
-    pub(crate) persistence: f64,
+    /// Column with the name of each row's target, of several in one file: each has a track of its own.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) target: Option<String>,
+    /// Column with the standard deviation of each row's ranges, right in proportion: the noise is estimated beside. Default: one that is called
+    /// so.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) accuracy_column: Option<String>,
+    /// Correlation time of the velocity in seconds. Default: 6, or longer if an anchor of a file sends less often than every 5 s.
+    #[arg(long, value_name = "SECONDS")]
+    pub(crate) persistence: Option<f64>,
     /// Probability that a range is an outlier, independent of the distance.
     #[arg(long, default_value_t = 0.02, value_name = "SHARE")]
     pub(crate) outliers: f64,
-    /// Seconds without a range after which the place is searched again.
-    #[arg(long, default_value_t = 30.0, value_name = "SECONDS")]
-    pub(crate) silence: f64,
+    /// Seconds without a range after which the place is searched again. Default: 30, or four times as long as an anchor of a file takes from
+    /// range to range.
+    #[arg(long, value_name = "SECONDS")]
+    pub(crate) silence: Option<f64>,
     /// Rows may be so much late, as `60s`: each waits that long, by the times of the rows, for earlier ones. Default: rows are in order.
     #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
     pub(crate) late: Option<std::time::Duration>,

@@ -1,16 +1,16 @@
 //! Which columns of a table are no sensors.
 
 use super::meaning::silence;
-use crate::arguments::TrackOptions;
+use crate::arguments::{TableOptions, TrackOptions};
 use crate::error::Error;
 use crate::input::Table;
 use fewbits_table::Kind as Cells;
 use fewbits_table::names::as_argument;
 
 /// Names of a column that has the name of each row's sensor. Anchors may be numbers.
-const LABELS: [&str; 16] = [
+const LABELS: [&str; 18] = [
     "name", "id", "sensor", "device", "entity", "channel", "source", "label", "mote", "tag", "topic", "uid", "anchor",
-    "node", "beacon", "station",
+    "node", "beacon", "station", "gateway", "gw",
 ];
 /// From this one on, numbers are names too, where places are looked for.
 const PLACED: usize = 12;
@@ -28,6 +28,8 @@ const ACCURACIES: [&str; 9] = [
 ];
 /// The same beside one column of values; of several sensors they may be something else.
 const ERRORS: [&str; 3] = ["error", "err", "precision"];
+/// Names of the column of ranges among others.
+const RANGES: [&str; 3] = ["range", "distance", "dist"];
 /// Names of columns that say how good a fix is, or whose it is: no sensor measures them.
 const NO_LEVELS: [&str; 10] = [
     "hdop",
@@ -61,7 +63,7 @@ pub(super) enum Finds {
     Labels,
     /// Also which one has accuracies.
     Levels,
-    /// Which column has the names of anchors, perhaps numbers.
+    /// The same, and the names may be numbers, of anchors.
     Anchors,
 }
 
@@ -110,6 +112,8 @@ pub(super) struct Roles {
     pub(super) accuracy: Option<String>,
     /// Names of sensors, and of columns of the accuracies of their values alone.
     pub(super) own_accuracies: Vec<(String, String)>,
+    /// The column of values, if it is found among others that are left out.
+    pub(super) value: Option<String>,
     /// What was found, a line each.
     pub(super) told: Vec<String>,
 }
@@ -150,6 +154,7 @@ impl Roles {
             by: kind.by.clone(),
             accuracy: kind.accuracy.clone(),
             own_accuracies: Vec::new(),
+            value: None,
             told: Vec::new(),
         };
         let is_free = |i: &usize| {
@@ -157,7 +162,7 @@ impl Roles {
             name != kind.by.as_ref() && name != kind.accuracy.as_ref() && name != kind.threshold.as_ref()
         };
         let free: Vec<usize> = (0..table.names.len()).filter(is_free).collect();
-        if is_whole && kind.finds == Finds::Levels && found.accuracy.is_none() {
+        if is_whole && kind.finds != Finds::Labels && found.accuracy.is_none() {
             let is_beside_one = free.iter().filter(|i| !holds_words(table, **i)).count() == 2;
             let is_said_by = |word: &str| ACCURACIES.contains(&word) || (is_beside_one && ERRORS.contains(&word));
             let is_accuracy = |i: &&usize| {
@@ -207,8 +212,9 @@ impl Roles {
             let values = free
                 .iter()
                 .filter(|i| !holds_words(table, **i) && !found.is_accuracy(&table.names[**i]));
-            let values = values.filter(|i| !labels.contains(&&table.names[**i])).count();
-            if let ([name], 1) = (labels.as_slice(), values) {
+            let values: Vec<&usize> = values.filter(|i| !labels.contains(&&table.names[**i])).collect();
+            let is_told = values.len() == 1 || is_whole && found.range(table, kind, &values).is_some();
+            if let ([name], true) = (labels.as_slice(), is_told) {
                 found.told.push(format!(
                     "each row is one reading of the sensor that {name} names, as --by {} says",
                     as_argument([name])
@@ -216,7 +222,53 @@ impl Roles {
                 found.by = Some((*name).clone());
             }
         }
+        if is_whole && found.by.is_some() {
+            let is_other =
+                |i: &&usize| found.by.as_ref() != Some(&table.names[**i]) && !found.is_accuracy(&table.names[**i]);
+            let others: Vec<&usize> = free.iter().filter(is_other).collect();
+            if let (2.., Some(value)) = (others.len(), found.range(table, kind, &others)) {
+                let rest = others
+                    .iter()
+                    .map(|i| table.names[**i].as_str())
+                    .filter(|name| *name != value);
+                found.told.push(format!(
+                    "{value} is taken for the range, as --columns {} says; left out: {}",
+                    as_argument([&value]),
+                    rest.collect::<Vec<_>>().join(", ")
+                ));
+                found.value = Some(value);
+            }
+        }
         found
+    }
+
+    /// How a table is read of which one column of values is taken.
+    pub(super) fn narrowed(&self, options: &TableOptions, kind: &Kind) -> Option<(TableOptions, Kind)> {
+        let value = self.value.as_ref()?;
+        let options = TableOptions {
+            columns: vec![as_argument([value])],
+            without: None,
+            ..options.clone()
+        };
+        let kind = Kind {
+            by: self.by.clone(),
+            accuracy: self.any_accuracy().cloned(),
+            ..kind.clone()
+        };
+        Some((options, kind))
+    }
+
+    /// The one of these columns that is called a range, where ranges are looked for.
+    fn range(&self, table: &Table, kind: &Kind, columns: &[&usize]) -> Option<String> {
+        let is_range = |i: &&&usize| {
+            !holds_words(table, ***i)
+                && words(&table.names[***i])
+                    .iter()
+                    .any(|word| RANGES.contains(&word.as_str()))
+        };
+        let mut found = columns.iter().filter(is_range).filter(|_| kind.finds == Finds::Anchors);
+        let first = found.next()?;
+        found.next().is_none().then(|| table.names[**first].clone())
     }
 
     /// A column of accuracies, if there is one.

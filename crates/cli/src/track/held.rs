@@ -59,27 +59,42 @@ fn held(values: &[f64]) -> Option<u32> {
     (is_often && is_fine).then_some(longest)
 }
 
+fn columns(first: &VecDeque<Instant>, sensors: usize) -> Vec<Column> {
+    let of = |sensor: usize| {
+        let all = first.iter().flat_map(|instant| &instant.reports);
+        let own = all.filter(|(other, _)| *other == sensor);
+        let values: Vec<f64> = own
+            .filter_map(|(_, cell)| cell.filter(|cell| cell.is_finite()))
+            .collect();
+        Column {
+            longest: held(&values).map_or(0, |longest| LONGER * longest),
+            ..Column::default()
+        }
+    };
+    (0..sensors).map(of).collect()
+}
+
 impl Held {
     /// Leaves them out of the first rows.
     pub(super) fn begin(first: &mut VecDeque<Instant>, sensors: usize) -> Self {
         let marks = Marks::begin(first, sensors);
-        let of = |sensor: usize| {
-            let all = first.iter().flat_map(|instant| &instant.reports);
-            let own = all.filter(|(other, _)| *other == sensor);
-            let values: Vec<f64> = own
-                .filter_map(|(_, cell)| cell.filter(|cell| cell.is_finite()))
-                .collect();
-            Column {
-                longest: held(&values).map_or(0, |longest| LONGER * longest),
-                ..Column::default()
-            }
-        };
-        let columns = (0..sensors).map(of).collect();
         let mut held = Self {
-            columns,
+            columns: columns(first, sensors),
             marks,
             constants: Constants::begin(first.make_contiguous(), sensors),
             derived: derived(first.make_contiguous(), sensors),
+        };
+        first.iter_mut().for_each(|row| held.leave_out(row));
+        held
+    }
+
+    /// Leaves only repetitions out of the first rows.
+    pub(super) fn of_repetitions(first: &mut VecDeque<Instant>, sensors: usize) -> Self {
+        let mut held = Self {
+            columns: columns(first, sensors),
+            marks: Marks::begin(&VecDeque::new(), sensors),
+            constants: Constants::begin(&[], sensors),
+            derived: Vec::new(),
         };
         first.iter_mut().for_each(|row| held.leave_out(row));
         held

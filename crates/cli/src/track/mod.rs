@@ -27,9 +27,13 @@
 //! | `ranges` | the task `ranges`: a place |
 //! | `anchors`, `odometry`, `path` | the table of its anchors, the columns of what the target moved, the picture |
 //! | `leak`, `leak_rooms` | the task `leak`: a room, and the file of rooms |
+//! | `range_summary` | what it says of a track |
 //! | `range_settings` | its options as settings, the law of signal strengths |
+//! | `targets` | several targets in one table |
+//! | `accuracies` | accuracies that its rows state |
 //! | `told` | what its first ranges tell: height, and errors that grow |
 
+mod accuracies;
 mod anchors;
 pub(crate) mod applied;
 mod centre;
@@ -63,6 +67,7 @@ mod own_columns;
 mod path;
 mod picture;
 mod range_settings;
+mod range_summary;
 mod ranges;
 mod remote;
 mod report;
@@ -85,8 +90,12 @@ pub(crate) use transform::Transform;
 use crate::Ending;
 use crate::arguments::{FitOptions, LeakOptions, Model, RangesOptions, TrackOptions};
 use crate::error::Error;
+use crate::output::Sheet;
+use crate::table_options::TableOptions;
 use columns::{Finds, Kind};
+use fewbits_table::names::as_argument;
 use rows::Instants;
+use targets::Target;
 
 /// Runs the task.
 pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {
@@ -141,6 +150,7 @@ pub(crate) fn ranges(options: &RangesOptions) -> Result<Ending, Error> {
     let kind = Kind {
         finds: Finds::Anchors,
         by: options.table.by.clone(),
+        accuracy: options.accuracy_column.clone(),
         late: options.late.map_or(0.0, |late| late.as_secs_f64()),
         ..Kind::default()
     };
@@ -149,9 +159,31 @@ pub(crate) fn ranges(options: &RangesOptions) -> Result<Ending, Error> {
         table.columns.extend(options.odometry.iter().cloned());
     }
     let anchors = anchors::read_anchors(&options.anchors)?;
-    targets::refuse_several(&table, &anchors)?;
-    let instants = Instants::open(&table, &kind)?;
-    let mut options = options.clone();
-    options.table.by.clone_from(&instants.roles.by);
-    ranges::run(&options, &anchors, instants)
+    let run = |table: &TableOptions, of: Option<Target>, output: &mut Option<Sheet>| {
+        let mut instants = Instants::open(table, &kind)?;
+        let mut options = options.clone();
+        options.table.by.clone_from(&instants.roles.by);
+        instants.only = of.as_ref().map(|target| target.rows.clone());
+        ranges::run(&options, &anchors, instants, of.as_ref(), output)
+    };
+    let mut output = None;
+    let Some(column) = &options.target else {
+        targets::refuse_several(&table, &anchors)?;
+        run(&table, None, &mut output)?;
+        return Ok(Ending::Good);
+    };
+    if options.plot.is_some() {
+        return Err(Error::content("--plot", "several targets have no picture: do one without --target"));
+    }
+    let targets = targets::targets(&table, column)?;
+    if table.columns.is_empty() {
+        let mut without = table.without();
+        without.push(column.clone());
+        table.without = Some(as_argument(&without));
+    }
+    for of in targets {
+        run(&table, Some(of), &mut output)?;
+    }
+    output.map_or(Ok(()), Sheet::finish)?;
+    Ok(Ending::Good)
 }

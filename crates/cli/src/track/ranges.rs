@@ -1,5 +1,6 @@
 //! Tracking of a position by distances to anchors.
 
+use super::accuracies::Accuracies;
 use super::anchors::{Anchor, together};
 use super::divisor::common_divisor;
 use super::instant::Instant;
@@ -7,11 +8,12 @@ use super::mistakes::{FIRST_RANGES, limited, mended, mistake, proportion};
 use super::odometry::Odometry;
 use super::path;
 use super::range_settings::{Strengths, settings};
+use super::range_summary::{AnchorSummary, OFTEN, Summary, lines};
 use super::report::{first_cell, first_name, summarise};
 use super::rows::Instants;
 use super::sensors;
+use super::targets::Target;
 use super::told::take_told;
-use crate::Ending;
 use crate::arguments::RangesOptions;
 use crate::error::Error;
 use crate::files::is_regular;
@@ -19,55 +21,16 @@ use crate::numbers::short;
 use crate::output::{Cell, Shape, Sheet};
 use crate::plot::Thinned;
 use crate::report::Report;
-use fewbits_pf_mpa::{Mistake, RangeEstimate, RangeSettings, RangeTracker, Travel};
-use serde::Serialize;
+use fewbits_pf_mpa::{RangeEstimate, RangeTracker, Travel};
+use nalgebra::Vector3;
 
 /// Most ranges longer than the anchors are apart by this factor, or shorter, have another unit.
 const LONG: f64 = 8.0;
 const SHORT: f64 = 0.05;
-/// A track that is lost once in so many rows is lost often.
-const OFTEN: u64 = 20;
+/// A target is far from the middle of the anchors from so many times their largest distance on.
+const FAR: f64 = 3.0;
 /// Probability below which an anchor whose ranges travel as levels is told to contradict the others.
 const SURELY: f64 = 0.1;
-
-#[derive(Serialize)]
-struct Summary {
-    rows: u64,
-    ranges: usize,
-    bits: usize,
-    bits_per_range: f64,
-    /// Number of rows without an estimate, during acquisition of the position.
-    searching: u64,
-    /// Number of rows in which several places explain the ranges.
-    ambiguous: u64,
-    /// Number of rows in which bias and scale contradict what is supposed of them.
-    doubtful: u64,
-    /// Number of ranges that were left out because they are negative.
-    negative: u64,
-    /// Number of ranges that were left out because they are zero.
-    zero: u64,
-    losses: usize,
-    anchors: Vec<AnchorSummary>,
-    /// What the ranges suggest that no option says.
-    hints: Vec<String>,
-    /// The mistake of the tables that explains the ranges.
-    #[serde(skip)]
-    mistake: Option<Mistake>,
-}
-
-#[derive(Serialize)]
-struct AnchorSummary {
-    name: String,
-    ranges: usize,
-    /// Probability at the end that its ranges depend on the distance.
-    works: f64,
-    /// Mean product of its successive residuals in their deviations, if it is far above zero: its place, or the law of its ranges, is wrong.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    lasting: Option<f64>,
-    /// The bias that it has alone.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    own_bias: Option<f64>,
-}
 
 /// Names of the columns behind the first.
 fn columns(axes: usize) -> Vec<String> {
@@ -98,7 +61,15 @@ fn cells(found: Option<&RangeEstimate>, axes: usize) -> Vec<Cell> {
 }
 
 /// Runs the task.
-pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Instants) -> Result<Ending, Error> {
+///
+/// `target`: one of several whose rows go into one sheet.
+pub(super) fn run(
+    options: &RangesOptions,
+    anchors: &[Anchor],
+    mut instants: Instants,
+    target: Option<&Target>,
+    output: &mut Option<Sheet>,
+) -> Result<(), Error> {
     let file = &options.anchors;
     let travel = match sensors::parse(&options.send)? {
         Report::Value | Report::Censored { .. } => Travel::Full,
@@ -114,16 +85,23 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
     let mut tracker = RangeTracker::new(anchors.iter().cloned(), travel, settings).map_err(refused)?;
     let known = |name: &str| anchors.iter().position(|(known, _)| known == name);
     let odometry = Odometry::new(options, anchors, &instants)?;
-    let is_stray = |name: &&String| known(name).is_none() && odometry.axis(name).is_none();
+    let is_target = |name: &String| target.is_some_and(|target| target.all.contains(name));
+    let is_stray = |name: &&String| known(name).is_none() && odometry.axis(name).is_none() && !is_target(name);
     if let Some(name) = instants.names.iter().find(is_stray) {
         return Err(unknown(instants.file(), name, file));
     }
     let axes = tracker.coordinates();
+    let mut accuracies = Accuracies::of(&mut instants, &options.table.file)?;
     let names = std::iter::once(first_name(&instants).to_owned())
+        .chain(target.map(|_| "target".to_owned()))
         .chain(columns(axes))
         .collect();
-    let mut sheet = Sheet::new(options.output.as_deref(), Shape::of(options.json), names)?;
+    let sheet = match output {
+        Some(sheet) => sheet,
+        None => output.insert(Sheet::new(options.output.as_deref(), Shape::of(options.json), names)?),
+    };
     let mut summary = Summary {
+        target: target.map(|target| target.name.clone()),
         rows: 0,
         ranges: 0,
         bits: 0,
@@ -149,7 +127,8 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
     };
     let mut places = Thinned::new();
     let apart = farthest(anchors);
-    let (mut long, mut small) = (0, 0);
+    let middle = anchors.iter().map(|(_, place)| place).sum::<Vector3<f64>>() / anchors.len() as f64;
+    let (mut long, mut small, mut between, mut far) = (0, 0, 0_u64, 0);
     let mut first: Vec<(f64, usize, f64)> = Vec::new();
     let (mut rounding, mut noise) = (0.0, f64::INFINITY);
     while let Some(instant) = instants.next()? {
@@ -168,6 +147,10 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
                 continue;
             }
             let Some(anchor) = known(name) else {
+                if is_target(name) {
+                    between += 1;
+                    continue;
+                }
                 return Err(unknown(instants.file(), name, file));
             };
             if range == 0.0 && !options.unknown_clock {
@@ -179,7 +162,10 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
                 summary.negative += 1;
                 continue;
             }
-            let pushed = tracker.push(instant.seconds, name, range);
+            let pushed = match accuracies.share(instant.qualifiers.get(i).and_then(|one| one.accuracy)) {
+                1.0 => tracker.push(instant.seconds, name, range),
+                share => tracker.push_with_noise(instant.seconds, name, range, share),
+            };
             let estimate = pushed.map_err(|source| refused_row(&instants, &instant, source))?;
             if estimate.as_ref().is_some_and(|estimate| estimate.lost) {
                 events = "lost";
@@ -195,11 +181,17 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
             }
             ranges += 1;
         }
+        if found.is_none() && ranges == 0 {
+            // The place that is expected then.
+            let moved = tracker.moved(instant.seconds, &Vector3::zeros());
+            found = moved.map_err(|source| refused_row(&instants, &instant, source))?;
+        }
         summary.rows += 1;
         summary.ranges += ranges;
         match &found {
             Some(found) => {
                 noise = found.noise;
+                far += u64::from((found.position - middle).norm() > FAR * apart);
                 let deviations = [0, 1].map(|i| found.covariance[(i, i)].sqrt());
                 places.push((found.position.xy(), deviations));
                 if found.places > 1 {
@@ -222,12 +214,16 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
         }
         let first = first_cell(&instants, instant.time);
         let last = [Cell::Whole(ranges as i64), Cell::Text(events.to_owned())];
-        sheet.write(std::iter::once(first).chain(cells(found.as_ref(), axes)).chain(last))?;
+        let label = target.map(|target| Cell::Text(target.name.clone()));
+        let cells = cells(found.as_ref(), axes);
+        sheet.write(std::iter::once(first).chain(label).chain(cells).chain(last))?;
         if instants.is_live() {
             sheet.flush()?;
         }
     }
-    sheet.finish()?;
+    if target.is_none() {
+        output.take().map_or(Ok(()), Sheet::finish)?;
+    }
     (summary.bits, summary.losses) = (tracker.bits(), tracker.losses());
     summary.bits_per_range = summary.bits as f64 / (summary.ranges as f64).max(1.0);
     for anchor in &mut summary.anchors {
@@ -257,6 +253,20 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
             "most ranges are many times {than} than the anchors are apart, {apart}: bring both to one unit, and take a constant delay off the ranges"
         ));
     }
+    summary.hints.extend(instants.strange_accuracies());
+    summary.hints.extend(accuracies.hint(noise));
+    if between > 0 {
+        summary
+            .hints
+            .push(format!("{between} ranges to other targets were left out"));
+    }
+    if 2 * far > summary.rows && options.bias.is_none() {
+        summary.hints.push(
+            "the target is far from the anchors beside what these are apart, where ranges hardly tell bias and scale from the place: state both, as \
+             --bias 0 --scale 0 for calibrated ranges"
+                .to_owned(),
+        );
+    }
     summary.hints.extend(limited(&first));
     if !is_regular(&options.table.file) {
         summary.hints.extend(proportion(anchors, settings, &first));
@@ -282,9 +292,13 @@ pub(super) fn run(options: &RangesOptions, anchors: &[Anchor], mut instants: Ins
             .hints
             .push(format!("{} copies of reports were dropped", instants.copies));
     }
-    let lines = lines(&summary, &tracker, settings, least);
-    summarise(&summary, &lines, options.json)?;
-    Ok(Ending::Good)
+    let mut lines = lines(&summary, &tracker, settings, least);
+    if let Some(target) = target {
+        lines
+            .iter_mut()
+            .for_each(|line| *line = format!("{}: {line}", target.name));
+    }
+    summarise(&summary, &lines, options.json)
 }
 
 /// The distance of the two anchors that are farthest from each other.
@@ -293,85 +307,6 @@ fn farthest(anchors: &[Anchor]) -> f64 {
         .iter()
         .flat_map(|(_, one)| anchors.iter().map(move |(_, other)| (one - other).norm()));
     pairs.fold(0.0, f64::max)
-}
-
-fn lines(summary: &Summary, tracker: &RangeTracker, settings: RangeSettings, least: f64) -> Vec<String> {
-    let silence = settings.silence;
-    let mut lines = vec![
-        format!("{} rows, {} ranges of {:.2} bits on average", summary.rows, summary.ranges, summary.bits_per_range),
-        format!("{} rows without a place, track lost {} times", summary.searching, summary.losses),
-    ];
-    // Values that are no distances say nothing of anchors.
-    let has_ranges = summary.ranges > 0 || summary.negative == 0;
-    if summary.zero > 0 {
-        lines.push(format!("{} ranges of 0 were left out, as radios write it for no range", summary.zero));
-    }
-    if summary.searching == summary.rows && has_ranges {
-        lines.push(format!("a place needs ranges of {} anchors within {silence} s: a larger --silence, or, if times are no seconds, --time-format with their unit",
-            tracker.needed()
-        ));
-    }
-    if summary.ambiguous > 0 {
-        lines.push(format!(
-            "{} rows with several places that explain the ranges: the band holds them",
-            summary.ambiguous
-        ));
-    }
-    if !has_ranges {
-        lines.push(format!(
-            "all {} values are negative: they are no distances. Signal strengths in dBm need --rssi; differences of ranges need --unknown-clock",
-            summary.negative
-        ));
-    } else if summary.negative > 0 {
-        lines.push(format!(
-            "{} negative ranges were left out: they are no distances; differences of ranges need --unknown-clock",
-            summary.negative
-        ));
-    }
-    if summary.doubtful > summary.rows / OFTEN {
-        lines.push(format!(
-            "{} rows are doubtful: bias and scale are larger than --bias and --scale allow, as if an anchor's ranges or place were wrong; --bias 0 --scale 0 for calibrated ranges shows which",
-            summary.doubtful
-        ));
-    }
-    lines.extend(summary.hints.iter().cloned());
-    // A wrong height lengthens the ranges of the nearest anchors, and their errors last.
-    let is_height = matches!(summary.mistake, Some(Mistake::Height(_) | Mistake::HeightChanges { .. }));
-    for anchor in &summary.anchors {
-        if anchor.ranges == 0 && !has_ranges {
-            continue;
-        }
-        if anchor.ranges == 0 {
-            lines.push(format!("no range from anchor {}", anchor.name));
-        } else if anchor.works < least {
-            lines.push(format!("anchor {} contradicts the others and is not used", anchor.name));
-        } else if let Some(bias) = anchor.own_bias.filter(|_| !is_height) {
-            let off = if bias > 0.0 { "long" } else { "short" };
-            let size = if settings.proportional {
-                format!("{} %", short(100.0 * bias.abs().exp_m1()))
-            } else {
-                short(bias.abs())
-            };
-            lines.push(format!(
-                "ranges of anchor {} are {size} too {off}, as if it stood elsewhere or were behind a wall: they are used less that",
-                anchor.name
-            ));
-        }
-    }
-    let lasting: Vec<(&str, f64)> = summary
-        .anchors
-        .iter()
-        .filter_map(|one| Some((one.name.as_str(), one.lasting?)))
-        .collect();
-    if !lasting.is_empty() && !is_height {
-        let most = lasting.iter().fold(0.0_f64, |most, (_, product)| most.max(*product));
-        let names: Vec<&str> = lasting.iter().map(|(name, _)| *name).collect();
-        lines.push(format!(
-            "errors of anchors {} last from range to range (mean product of neighbours up to {most:.2} of their variance), so bands are too narrow: an anchor stands elsewhere than its table says, or walls lengthen ranges",
-            names.join(", ")
-        ));
-    }
-    lines
 }
 
 fn refused_row(instants: &Instants, instant: &Instant, source: fewbits_pf_mpa::Error) -> Error {
@@ -383,6 +318,6 @@ fn refused_row(instants: &Instants, instant: &Instant, source: fewbits_pf_mpa::E
 }
 
 fn unknown(table: &str, name: &str, anchors: &str) -> Error {
-    let mend = "add it there, choose columns with --columns, or name the column of anchors with --by";
+    let mend = "add it there, choose columns with --columns or --odometry, or name the column of anchors with --by";
     Error::content(table, format_args!("`{name}` is no anchor of {anchors}: {mend}"))
 }

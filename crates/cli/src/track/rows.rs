@@ -8,10 +8,12 @@ use super::late::Late;
 use super::own_columns::OwnColumns;
 use super::samples::Samples;
 use super::seconds::Seconds;
+use super::targets::OfTarget;
 use super::transform::Transform;
 use crate::arguments::TableOptions;
 use crate::clock;
 use crate::error::Error;
+use crate::files::is_regular;
 use crate::input::Table;
 use fewbits_record::TimeBase;
 use std::collections::VecDeque;
@@ -57,6 +59,8 @@ pub(super) struct Instants {
     samples: Option<Samples>,
     /// What is left out of rows because it only repeats.
     held: Option<Held>,
+    /// The rows that are taken, if not all are.
+    pub(super) only: Option<OfTarget>,
 }
 
 impl Instants {
@@ -74,6 +78,11 @@ impl Instants {
         };
         let mut table = Table::open_with_time(&chosen, 2)?;
         let roles = Roles::find(&table, kind, chosen.columns.is_empty());
+        if let Some((options, kind)) = roles.narrowed(options, kind).filter(|_| is_regular(&options.file)) {
+            let mut open = Self::open(&options, &kind)?;
+            open.roles.told = roles.told;
+            return Ok(open);
+        }
         if let Some(name) = &roles.by {
             table = table.with_labels(name)?;
         }
@@ -122,6 +131,7 @@ impl Instants {
             late: Late::new(kind.late),
             samples: kind.sampled.map(Samples::new),
             held: None,
+            only: None,
         })
     }
 
@@ -189,6 +199,15 @@ impl Instants {
     pub(super) fn leave_out_repetitions(&mut self) -> Vec<usize> {
         self.held = Some(Held::begin(&mut self.ahead, self.names.len()));
         self.held.iter().flat_map(Held::sensors).collect()
+    }
+
+    /// The same of repetitions alone, from so many first rows.
+    pub(super) fn leave_out_old(&mut self, count: usize) -> Result<Vec<usize>, Error> {
+        self.peek(count)?;
+        let held = Held::of_repetitions(&mut self.ahead, self.names.len());
+        let found: Vec<usize> = held.sensors().collect();
+        self.held = Some(held).filter(|_| !found.is_empty());
+        Ok(found)
     }
 
     fn read_new(&mut self) -> Result<Option<Instant>, Error> {
@@ -312,12 +331,18 @@ impl Instants {
     }
 
     fn read_any_row(&mut self) -> Result<Option<Instant>, Error> {
-        let Some((tick, cells)) = self.table.next(self.base)? else {
-            return Ok(None);
+        let (tick, cells, row) = loop {
+            let Some((tick, cells)) = self.table.next(self.base)? else {
+                return Ok(None);
+            };
+            let tick = tick.unwrap_or(self.next_number);
+            self.next_number = tick.wrapping_add(1);
+            let row = self.table.row();
+            if self.only.as_ref().is_none_or(|only| only.has(row)) {
+                break (tick, cells, row);
+            }
         };
-        let tick = tick.unwrap_or(self.next_number);
-        self.next_number = tick.wrapping_add(1);
-        let (row, may_be_late) = (self.table.row(), self.late.is_waiting());
+        let may_be_late = self.late.is_waiting();
         let (tick, seconds) = self.seconds.of(tick, may_be_late, row, self.table.file());
         let time = clock::shown(tick, self.base);
         if seconds < self.last && !may_be_late {

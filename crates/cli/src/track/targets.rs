@@ -8,7 +8,9 @@ use crate::files::is_regular;
 use crate::input::Table;
 use fewbits_record::TimeBase;
 use fewbits_table::Kind;
+use fewbits_table::names::as_argument;
 use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
 
 /// Names of a column that has the name of each row's target.
 const TARGETS: [&str; 14] = [
@@ -20,6 +22,69 @@ const ROWS: usize = 4000;
 /// A target has at least so many rows, and a table at most so many targets: others are counters.
 const FEWEST: usize = 8;
 const MOST: usize = 20;
+/// Targets that are tracked, at most.
+const MOST_TRACKED: usize = 1000;
+
+/// A target of a table.
+pub(super) struct Target {
+    pub(super) name: String,
+    pub(super) rows: OfTarget,
+    /// The names of all.
+    pub(super) all: Rc<[String]>,
+}
+
+/// The number of a target, and that of each row.
+#[derive(Clone)]
+pub(super) struct OfTarget {
+    number: usize,
+    rows: Rc<[Option<usize>]>,
+}
+
+impl OfTarget {
+    /// Whether a row, counted from 1, is of this target.
+    pub(super) fn has(&self, row: u64) -> bool {
+        let place = usize::try_from(row).unwrap_or(usize::MAX).wrapping_sub(1);
+        self.rows.get(place).copied().flatten() == Some(self.number)
+    }
+}
+
+/// The targets that a column of a file names, as they come, with their rows.
+pub(super) fn targets(options: &TableOptions, column: &str) -> Result<Vec<Target>, Error> {
+    const OPTION: &str = "--target";
+    if !is_regular(&options.file) {
+        return Err(Error::option(OPTION, column, "a file in place of a pipe, since it is read more than once"));
+    }
+    let chosen = TableOptions {
+        by: None,
+        ..options.clone()
+    };
+    let mut table = Table::open_with_time(&chosen, 2)?.with_labels(column)?;
+    let (mut names, mut rows) = (Vec::<String>::new(), Vec::new());
+    while table.next(TimeBase::Numbered)?.is_some() {
+        let label = table.label();
+        rows.push((!label.is_empty()).then(|| match names.iter().position(|name| name == label) {
+            Some(number) => number,
+            None => {
+                names.push(label.to_owned());
+                names.len() - 1
+            }
+        }));
+        if names.len() > MOST_TRACKED {
+            return Err(Error::option(OPTION, column, "a column that names at most 1000 targets"));
+        }
+    }
+    let rows: Rc<[Option<usize>]> = rows.into();
+    let all: Rc<[String]> = names.into();
+    let of = |(number, name): (usize, &String)| Target {
+        name: name.clone(),
+        rows: OfTarget {
+            number,
+            rows: Rc::clone(&rows),
+        },
+        all: Rc::clone(&all),
+    };
+    Ok(all.iter().enumerate().map(of).collect())
+}
 
 /// The column that names the anchor of each row, if rows are single ranges.
 fn by(options: &TableOptions, names: &[String]) -> Option<String> {
@@ -96,10 +161,11 @@ pub(super) fn refuse_several(options: &TableOptions, anchors: &[Anchor]) -> Resu
         if is_plain && is_crossed && !is_anchor {
             let some: Vec<String> = counts.keys().take(3).map(|target| format!("`{target}`")).collect();
             let problem = format!(
-                "column `{name}` names {} targets, {}, and one target is tracked: split the table by that column and give `ranges` each part; \
+                "column `{name}` names {} targets, {}, and one target is tracked: --target {} gives each a track; \
                  without that column all rows are of one target",
                 counts.len(),
-                some.join(", ")
+                some.join(", "),
+                as_argument([name])
             );
             return Err(Error::content(&options.file, problem));
         }

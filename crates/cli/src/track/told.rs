@@ -9,9 +9,15 @@ use crate::error::Error;
 use crate::files::is_regular;
 use crate::numbers::short;
 use fewbits_pf_mpa::{Height, RangeSettings, height_of, proportion_of};
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
 
 /// Rows from which it is found.
 const FIRST_ROWS: usize = 600;
+/// A place is kept over so many steps of an anchor without a range.
+const SILENCES: f64 = 4.0;
+/// Seconds between an anchor's ranges up to which the library's speeds are supposed.
+const EACH: f64 = 5.0;
 
 /// Time in seconds, anchor and range of the first rows, without limits.
 fn first(
@@ -44,6 +50,43 @@ fn first(
     Ok(ranges)
 }
 
+/// The median of the seconds from range to range of an anchor.
+fn each(ranges: &[(f64, &str, f64)]) -> Option<f64> {
+    let mut last: BTreeMap<&str, f64> = BTreeMap::new();
+    let mut steps: Vec<f64> = Vec::new();
+    for (time, name, _) in ranges {
+        steps.extend(last.insert(name, *time).map(|before| time - before));
+    }
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied()
+}
+
+/// Takes into the settings that an anchor sends every so many seconds, if these are many: a target whose ranges come slowly moves slowly.
+fn take_slowness(
+    options: &RangesOptions,
+    anchors: &[Anchor],
+    settings: &mut RangeSettings,
+    each: f64,
+) -> Option<String> {
+    let kept = options.silence.is_none().then_some(SILENCES * each)?;
+    if kept <= settings.silence {
+        return None;
+    }
+    settings.silence = kept;
+    let (slower, shown) = (each / EACH, short(kept));
+    let mut said =
+        format!("an anchor sends every {} s: a place is kept for {shown} s, as --silence {shown} says", short(each));
+    if slower > 1.0 && options.persistence.is_none() && options.speed.is_none() && options.odometry.is_empty() {
+        let places: Vec<Vector3<f64>> = anchors.iter().map(|(_, place)| *place).collect();
+        *settings = settings.slower(&places, slower);
+        said += &format!(
+            ", and the target is supposed to be {} times slower, as --speed and --persistence may say better",
+            short(slower)
+        );
+    }
+    Some(said)
+}
+
 /// Takes into the settings what the first ranges of a file tell, and says it. What comes through a pipe is not waited for.
 pub(super) fn take_told(
     options: &RangesOptions,
@@ -52,6 +95,16 @@ pub(super) fn take_told(
     instants: &mut Instants,
 ) -> Result<Vec<String>, Error> {
     let mut said = Vec::new();
+    if is_regular(&options.table.file) {
+        let old = instants.leave_out_old(FIRST_ROWS)?;
+        if !old.is_empty() {
+            let names: Vec<&str> = old.iter().map(|i| instants.names[*i].as_str()).collect();
+            said.push(format!(
+                "ranges of {} that repeat the one before are left out: the table holds them until there is a new one",
+                names.join(", ")
+            ));
+        }
+    }
     let is_flat = anchors.iter().all(|(_, place)| place.z == 0.0);
     if is_regular(&options.table.file) {
         let owned = first(options, anchors, instants)?;
@@ -59,6 +112,7 @@ pub(super) fn take_told(
             .iter()
             .map(|(time, name, range)| (*time, name.as_str(), *range))
             .collect();
+        said.extend(each(&ranges).and_then(|each| take_slowness(options, anchors, settings, each)));
         // What is wrong with a range is said when its row is read.
         let height = |settings: RangeSettings| height_of(anchors, settings, &ranges).unwrap_or(None);
         let proportion = |settings: RangeSettings| proportion_of(anchors, settings, &ranges).unwrap_or(None);
@@ -67,8 +121,9 @@ pub(super) fn take_told(
             ..settings
         };
         let mut found = height(*settings);
-        // A height that is not known makes errors that depend on the distance too.
-        if let Some((noise, proportional)) = proportion(at(*settings, found)) {
+        // A height that is not known makes errors that depend on the distance too, and rows may state theirs.
+        let grows_by = |settings| proportion(settings).filter(|_| instants.roles.any_accuracy().is_none());
+        if let Some((noise, proportional)) = grows_by(at(*settings, found)) {
             said.push(grows(noise, "taken, as"));
             *settings = RangeSettings {
                 height: settings.height,

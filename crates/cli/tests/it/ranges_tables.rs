@@ -2,7 +2,7 @@
 
 use crate::numbers::Numbers;
 use crate::ranges::{Point, RECTANGLE, anchors, distance, holds, off, ranges, table};
-use crate::{fewbits, refused, text};
+use crate::{fewbits, good, refused, text};
 
 /// Columns of what the target moved since the row before: it is followed between ranges, in rows without any too.
 #[test]
@@ -255,7 +255,7 @@ fn several_targets_are_refused_with_the_mend() {
     for (column, label) in [("tag", "t"), ("id", "badge "), ("target", "")] {
         write(column, &|row| format!("{label}{}", row % 2));
         let error = refused(folder.path(), &words, b"");
-        assert!(error.contains("names 2 targets") && error.contains("split the table"), "{error}");
+        assert!(error.contains("names 2 targets") && error.contains(&format!("--target {column}")), "{error}");
     }
     // One target, a counter, and another name of the anchors.
     for label in [
@@ -266,6 +266,177 @@ fn several_targets_are_refused_with_the_mend() {
         write("id", &label);
         assert!(fewbits(folder.path(), &words, b"").status.success());
     }
+}
+
+/// Two targets of one file have each a track, in one table.
+#[test]
+fn several_targets_have_a_track_each() {
+    let folder = tempfile::tempdir().unwrap();
+    anchors(folder.path(), &RECTANGLE, 1.0, false);
+    let truths = [[4.0, 2.0, 0.0], [9.0, 5.0, 0.0]];
+    let line = |row: usize| {
+        let range = distance(&RECTANGLE[row / 2 % 4], &truths[row % 2]);
+        format!("{},t{},n{},{range}\n", 0.1 * (row / 2) as f64, row % 2, row / 2 % 4)
+    };
+    let mixed: String = (0..200).map(line).collect();
+    let apart: String = (0..200).step_by(2).chain((1..200).step_by(2)).map(line).collect();
+    // In turns, one behind the other, and with rows of no target.
+    for rows in [mixed.clone(), apart, mixed + "9.9,,n0,700\n"] {
+        std::fs::write(folder.path().join("t.csv"), format!("time,tag,anchor,range\n{rows}")).unwrap();
+        let words = [
+            "ranges",
+            "t.csv",
+            "--anchors",
+            "anchors.csv",
+            "--target",
+            "tag",
+            "--json",
+        ];
+        let out = text(&good(folder.path(), &words, b"")).to_owned();
+        let found: Vec<serde_json::Value> = out.lines().map(|row| serde_json::from_str(row).unwrap()).collect();
+        assert_eq!(found.len(), 200);
+        for (name, truth) in ["t0", "t1"].iter().zip(&truths) {
+            let own: Vec<&serde_json::Value> = found.iter().filter(|row| row["target"] == **name).collect();
+            assert_eq!(own.len(), 100);
+            assert!(holds(own[99], truth) && off(own[99], truth) < 0.1, "{}", own[99]);
+        }
+    }
+    let told =
+        text(&fewbits(folder.path(), &["ranges", "t.csv", "--anchors", "anchors.csv", "--target", "tag"], b"").stderr)
+            .to_owned();
+    assert!(told.contains("t1: 100 rows"), "{told}");
+    let pipe = refused(folder.path(), &["ranges", "-", "--anchors", "anchors.csv", "--target", "tag"], b"a,b\n1,2\n");
+    assert!(pipe.contains("--target") && pipe.contains("a file"), "{pipe}");
+}
+
+/// Rows that state how accurate they are, five times too small a number: the bad ones were believed as the good ones.
+#[test]
+fn accuracies_of_rows_are_taken_in_proportion() {
+    let folder = tempfile::tempdir().unwrap();
+    anchors(folder.path(), &RECTANGLE, 1.0, false);
+    let mut numbers = Numbers(5);
+    let truth = |row: usize| {
+        let angle = 0.01 * row as f64;
+        [6.0 + 3.0 * angle.sin(), 3.5 + 2.0 * (0.8 * angle).cos(), 0.0]
+    };
+    let (mut rows, mut wide) = (String::new(), String::from("time,n0,n1,n2,n3,accuracy\n"));
+    for row in 0..600 {
+        let accuracy = if row % 3 == 0 { 0.02 } else { 0.4 };
+        let mut measured = |i: usize| distance(&RECTANGLE[i], &truth(row)) + accuracy * numbers.normal();
+        let range = measured(row % 4);
+        rows += &format!("{},n{},{range},{}\n", 0.05 * row as f64, row % 4, 0.2 * accuracy);
+        let cells = [0, 1, 2, 3].map(|i| measured(i).to_string());
+        wide += &format!("{},{},{accuracy}\n", 0.05 * row as f64, cells.join(","));
+    }
+    let rms = |table: &str, options: &[&str]| {
+        let found = ranges(folder.path(), table, options);
+        let late = found.iter().enumerate().skip(100);
+        let held = late.clone().filter(|(row, found)| holds(found, &truth(*row))).count();
+        let squares: f64 = late.map(|(row, found)| off(found, &truth(row)).powi(2)).sum();
+        ((squares / 500.0).sqrt(), held)
+    };
+    let found = rms(&format!("time,anchor,range,std\n{rows}"), &[]);
+    let named = rms(&format!("time,anchor,range,q\n{rows}"), &["--by", "anchor", "--accuracy-column", "q"]);
+    let none = rms(&format!("time,anchor,range,q\n{rows}"), &["--by", "anchor", "--columns", "range"]);
+    let wide = rms(&wide, &[]);
+    println!("{found:?} {named:?} {none:?} {wide:?}");
+    assert!(found == named && found.0 < 0.6 * none.0 && wide.0 < 0.1, "{found:?} {named:?} {none:?} {wide:?}");
+    assert!(found.1 > 420 && wide.1 > 420, "{found:?} {wide:?}");
+    let table = format!("time,anchor,range,std\n{rows}");
+    let told =
+        text(&fewbits(folder.path(), &["ranges", "-", "--anchors", "anchors.csv"], table.as_bytes()).stderr).to_owned();
+    assert!(told.contains("times as much as rows state"), "{told}");
+    let bits = refused(folder.path(), &["ranges", "-", "--anchors", "anchors.csv", "--send", "bit"], table.as_bytes());
+    assert!(bits.contains("ranges in full"), "{bits}");
+}
+
+/// A table that is written every 10 s, with old ranges where there is no new one: bands held .69 of the truths.
+#[test]
+fn ranges_that_repeat_and_slow_ones_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let places = [
+        [0.0, 0.0, 0.0],
+        [100.0, 0.0, 0.0],
+        [100.0, 80.0, 0.0],
+        [0.0, 80.0, 0.0],
+        [50.0, 95.0, 0.0],
+    ];
+    anchors(folder.path(), &places, 1.0, false);
+    let mut numbers = Numbers(8);
+    let truth = |row: usize| {
+        let angle = 0.07 * row as f64;
+        [50.0 + 30.0 * angle.sin(), 40.0 + 25.0 * (0.8 * angle).cos(), 0.0]
+    };
+    let (mut last, mut rows) = ([0.0; 5], String::from("time,n0,n1,n2,n3,n4\n"));
+    for row in 0..200 {
+        for (i, last) in last.iter_mut().enumerate() {
+            if row == 0 || numbers.normal() > 0.0 {
+                *last = distance(&places[i], &truth(row)) + 0.2 * numbers.normal();
+            }
+        }
+        rows += &format!("{},{}\n", 10 * row, last.map(|range| format!("{range:.3}")).join(","));
+    }
+    std::fs::write(folder.path().join("t.csv"), &rows).unwrap();
+    let words = ["ranges", "t.csv", "--anchors", "anchors.csv", "--json"];
+    let out = text(&good(folder.path(), &words, b"")).to_owned();
+    let found: Vec<serde_json::Value> = out.lines().map(|row| serde_json::from_str(row).unwrap()).collect();
+    let held = found
+        .iter()
+        .enumerate()
+        .filter(|(row, found)| holds(found, &truth(*row)))
+        .count();
+    assert!(held > 170, "{held}");
+    let told = text(&fewbits(folder.path(), &words[..4], b"").stderr).to_owned();
+    assert!(told.contains("that repeat the one before are left out") && told.contains("--silence 80"), "{told}");
+}
+
+/// The range among other columns, a status in words among them; a row whose range is missing has the place that is expected.
+#[test]
+fn the_column_of_ranges_is_found_among_others() {
+    let folder = tempfile::tempdir().unwrap();
+    anchors(folder.path(), &RECTANGLE, 1.0, false);
+    let truth = [4.0, 2.0, 0.0];
+    let mut rows = String::from("time,anchor,range,state,fp_power\n");
+    for row in 0..100 {
+        let range = distance(&RECTANGLE[row % 4], &truth);
+        let range = if row % 5 == 4 { String::new() } else { range.to_string() };
+        rows += &format!("{},n{},{range},{},-{}\n", 0.1 * row as f64, row % 4, ["ok", "late"][row % 2], 80 + row % 7);
+    }
+    std::fs::write(folder.path().join("t.csv"), &rows).unwrap();
+    let words = ["ranges", "t.csv", "--anchors", "anchors.csv", "--json"];
+    let out = text(&good(folder.path(), &words, b"")).to_owned();
+    let found: Vec<serde_json::Value> = out.lines().map(|row| serde_json::from_str(row).unwrap()).collect();
+    assert!(found.len() == 100 && found[20..].iter().all(|row| holds(row, &truth)), "{out}");
+    let told = text(&fewbits(folder.path(), &words[..4], b"").stderr).to_owned();
+    assert!(
+        told.contains("range is taken for the range") && told.contains("left out: state, fp_power"),
+        "{told}"
+    );
+    let pipe = refused(folder.path(), &["ranges", "-", "--anchors", "anchors.csv"], rows.as_bytes());
+    assert!(pipe.contains("--columns"), "{pipe}");
+}
+
+/// Ranges between two targets are not those of an anchor; and a target far from all anchors is told.
+#[test]
+fn ranges_between_targets_and_far_ones_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    anchors(folder.path(), &RECTANGLE, 1.0, false);
+    let truths = [[4.0, 2.0, 0.0], [120.0, 70.0, 0.0]];
+    let mut rows = String::from("time,tag,anchor,range\n");
+    for row in 0..400 {
+        let (target, step) = (row % 2, row / 2);
+        let (name, place) = match step % 5 {
+            4 => (format!("t{}", 1 - target), truths[1 - target]),
+            anchor => (format!("n{anchor}"), RECTANGLE[anchor]),
+        };
+        rows += &format!("{},t{target},{name},{}\n", 0.1 * step as f64, distance(&place, &truths[target]));
+    }
+    std::fs::write(folder.path().join("t.csv"), rows).unwrap();
+    let told = fewbits(folder.path(), &["ranges", "t.csv", "--anchors", "anchors.csv", "--target", "tag"], b"");
+    let told = text(&told.stderr).to_owned();
+    assert!(told.contains("t0: 40 ranges to other targets were left out"), "{told}");
+    let far = "the target is far from the anchors";
+    assert!(told.contains(&format!("t1: {far}")) && !told.contains(&format!("t0: {far}")), "{told}");
 }
 
 /// Anchors whose names are exchanged, and ranges that are no distances: the mend is told.

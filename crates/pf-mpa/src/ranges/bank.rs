@@ -236,15 +236,15 @@ impl Hypothesis {
         self.mixed = next;
     }
 
-    /// Computes the moments of the next range of an anchor. Returns its mean and variance with noise.
-    pub(super) fn expect(&mut self, known: &Known, place: &[f64; 3], anchor: usize) -> (f64, f64) {
+    /// Computes the moments of the next range of an anchor. `of_noise`: its noise as a share of the bank's. Returns its mean and variance with noise.
+    pub(super) fn expect(&mut self, known: &Known, place: &[f64; 3], anchor: usize, of_noise: f64) -> (f64, f64) {
         let above = place[2] - known.level;
         let noises = known.noises.len();
         let (mut mean, mut square) = (0.0, 0.0);
         self.predicted
             .resize_with(self.alive.len().max(self.predicted.len()), Predicted::default);
         for (i, out) in self.alive.iter().zip(&mut self.predicted) {
-            let (weight, noise) = (self.weights[*i], known.noises[i % noises]);
+            let (weight, noise) = (self.weights[*i], of_noise * known.noises[i % noises]);
             self.filters[*i].range(known.measured, place, above, anchor, out);
             mean += weight * out.mean;
             square += weight * (out.variance + noise * noise);
@@ -279,12 +279,13 @@ impl Hypothesis {
         known: &Known,
         anchor: usize,
         arrived: &Arrived,
+        of_noise: f64,
         holds_scale: bool,
     ) -> Result<f64, Error> {
         let (noises, stray) = (known.noises.len(), arrived.stray(known.stray));
         if matches!(arrived, Arrived::First(_)) {
             for (i, predicted) in self.alive.iter().zip(&self.predicted) {
-                let (_, mean, variance, _) = arrived.right(predicted, known.noises[i % noises])?;
+                let (_, mean, variance, _) = arrived.right(predicted, of_noise * known.noises[i % noises])?;
                 self.filters[*i].condition(predicted, mean, variance, holds_scale);
             }
             return Ok(0.0);
@@ -294,7 +295,8 @@ impl Hypothesis {
         let (mut total, mut agreeing, mut score) = (0.0, 0.0, 0.0);
         let old: f64 = self.alive.iter().map(|i| self.weights[*i]).sum();
         for (i, predicted) in self.alive.iter().copied().zip(&self.predicted) {
-            let (density, mean, variance, innovation) = arrived.right(predicted, known.noises[i % noises])?;
+            let (density, mean, variance, innovation) =
+                arrived.right(predicted, of_noise * known.noises[i % noises])?;
             let right = right_share * density;
             let evidence = right + (1.0 - right_share) * stray;
             let share = if evidence > 0.0 { right / evidence } else { 0.0 };

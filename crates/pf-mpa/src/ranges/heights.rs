@@ -20,7 +20,7 @@ const APART: f64 = 6.0;
 const HALVINGS: usize = 3;
 /// Ranges from which it is found, at most, and at least for each anchor.
 pub(super) const RANGES: usize = 400;
-const FEWEST: usize = 8;
+pub(super) const FEWEST: usize = 8;
 
 /// The constant height of the target, from its first ranges: each height that is tried is a tracker, and their evidences decide. `ranges`: time in
 /// seconds, anchor and range. If all anchors have one height, above and below it are the same: anchors that hang high are above the target. It is only

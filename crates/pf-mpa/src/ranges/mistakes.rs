@@ -155,13 +155,23 @@ fn try_tables(
         );
         Ok::<(), Error>(())
     };
+    // An exchange shows in the ranges of both.
+    let is_heard = |name: &String| ranges.iter().filter(|(_, anchor, _)| anchor == name).count() >= heights::FEWEST;
     for (i, (name, place)) in anchors.iter().enumerate() {
         let mut others = anchors.to_vec();
         (others[i].1.x, others[i].1.y) = (place.y, place.x);
+        if !is_heard(name) {
+            continue;
+        }
         if place.x != place.y {
             fit(&others, ranges, 0.0, Mistake::Axes(name.clone()))?;
         }
-        for (j, (other, at)) in anchors.iter().enumerate().skip(i + 1) {
+        for (j, (other, at)) in anchors
+            .iter()
+            .enumerate()
+            .skip(i + 1)
+            .filter(|(_, (other, _))| is_heard(other))
+        {
             let mut others = anchors.to_vec();
             (others[i].1, others[j].1) = (*at, *place);
             fit(&others, ranges, 0.0, Mistake::Swapped(name.clone(), other.clone()))?;

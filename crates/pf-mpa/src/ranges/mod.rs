@@ -175,12 +175,8 @@ impl RangeTracker {
         }
     }
 
-    /// Processes one range at `time` (seconds, not before the last). `None` during acquisition.
-    ///
-    /// # Errors
-    /// If there is no such anchor, a number is not finite, `time` is before the last range's, or a range whose error is in proportion to the
-    /// distance is not positive.
-    pub fn push(&mut self, time: f64, anchor: &str, range: f64) -> Result<Option<RangeEstimate>, Error> {
+    /// Processes one range, whose noise is `share` times that of the bank.
+    fn take(&mut self, time: f64, anchor: &str, range: f64, share: f64) -> Result<Option<RangeEstimate>, Error> {
         finite("range", range)?;
         finite("range in 32 bits", f64::from(range as f32))?;
         self.check_time(time)?;
@@ -198,13 +194,13 @@ impl RangeTracker {
         self.heard[anchor] = time;
         if self.hypotheses.is_empty() {
             self.bits += FULL_BITS;
-            self.search(time, is_new, anchor, f64::from(range as f32));
+            self.search(time, is_new, anchor, Latest::new(time, f64::from(range as f32), share));
             self.last = time;
             return Ok(self.estimate(false));
         }
         let mut next = std::mem::take(&mut self.next);
         next.clone_from(&self.hypotheses);
-        let lost = match self.track(&mut next, time - self.at, is_new, anchor, range) {
+        let lost = match self.track(&mut next, time - self.at, is_new, anchor, (range, share)) {
             Ok((taken, residual)) => {
                 self.evidence += taken;
                 if self.travel == Travel::Full && (self.known.clock.is_none() || !is_new) {
@@ -226,7 +222,7 @@ impl RangeTracker {
                 self.collected.clear();
             }
             self.collected
-                .insert(anchor, Latest::new(time, f64::from(range as f32)));
+                .insert(anchor, Latest::new(time, f64::from(range as f32), share));
         }
         if !next.is_empty() {
             std::mem::swap(&mut self.hypotheses, &mut next);
@@ -241,7 +237,7 @@ impl RangeTracker {
     }
 
     /// Collects a range, and looks for places once there are enough.
-    fn search(&mut self, time: f64, is_new: bool, anchor: usize, range: f64) {
+    fn search(&mut self, time: f64, is_new: bool, anchor: usize, found: Latest) {
         let least = self.known.axes + 1;
         if self.known.clock.is_some() && is_new {
             // The ranges of one time are complete.
@@ -251,7 +247,8 @@ impl RangeTracker {
             self.collected.clear();
             if !self.hypotheses.is_empty() {
                 let mut next = self.hypotheses.clone();
-                if let Ok((taken, _)) = self.track(&mut next, time - self.at, true, anchor, range) {
+                if let Ok((taken, _)) = self.track(&mut next, time - self.at, true, anchor, (found.range, found.share))
+                {
                     self.hypotheses = next;
                     self.at = time;
                     self.evidence += taken;
@@ -261,7 +258,7 @@ impl RangeTracker {
         }
         let silence = self.known.silence;
         self.collected.retain(|_, latest| time - latest.time <= silence);
-        self.collected.insert(anchor, Latest::new(time, range));
+        self.collected.insert(anchor, found);
         self.tried += 1;
         // An anchor that never answers is not waited for.
         let is_enough = self.collected.len() >= self.needed();
@@ -294,7 +291,7 @@ impl RangeTracker {
         elapsed: f64,
         is_new: bool,
         anchor: usize,
-        range: f64,
+        (range, of_noise): (f64, f64),
     ) -> Result<(f64, f64), Error> {
         let (known, place) = (&self.known, &self.places[anchor]);
         let step = Step::over(elapsed, known.persistence, known.drift);
@@ -306,7 +303,7 @@ impl RangeTracker {
             if let Some(clock) = known.clock.filter(|_| is_new) {
                 one.forget_bias(known, clock, place, anchor, range);
             }
-            let (expected, variance) = one.expect(known, place, anchor);
+            let (expected, variance) = one.expect(known, place, anchor, of_noise);
             mean += share * expected;
             square += share * (variance + expected * expected);
             expectations.push((expected, variance));
@@ -356,7 +353,7 @@ impl RangeTracker {
         next.retain_mut(|one| {
             let short = is_short(one);
             let holds_scale = one.rests(known, short) || (!one.is_cut && short);
-            match one.update(known, anchor, &arrived, holds_scale) {
+            match one.update(known, anchor, &arrived, of_noise, holds_scale) {
                 Ok(log_evidence) if one.is_finite() => {
                     evidences.push((is_undecided || short && one.apart.is_some(), log_evidence));
                     true

@@ -65,9 +65,11 @@ impl Hypothesis {
     }
 
     /// Of its recent evidence beside that of hypotheses which determine the state, only what goes beyond the little errors of the model counts, and that
-    /// for good.
-    fn settle(&mut self, others: f64) {
-        let kept = self.recent.clamp(-UNDECIDED, GAINED);
+    /// for good. `best`: the most recent evidence of a hypothesis that does not determine the state. What that one gains others gain too as far as they
+    /// have evidence: or a few nats that decide nothing would leave the first of them alone.
+    fn settle(&mut self, others: f64, best: f64) {
+        let gained = (best - GAINED).clamp(0.0, self.recent.max(0.0));
+        let kept = (self.recent - gained).max(-UNDECIDED);
         self.log_weight += others + self.recent - kept - self.behind;
         (self.recent, self.behind) = (kept, 0.0);
     }
@@ -98,12 +100,18 @@ pub(super) fn weigh(hypotheses: &mut [Hypothesis], evidences: &[(bool, f64)]) {
     }
     // The evidence of those that are determined, together.
     let others = most + (sum / total).ln();
+    let mut best = f64::NEG_INFINITY;
     for (one, (is_undetermined, log_evidence)) in hypotheses.iter_mut().zip(evidences) {
         if *is_undetermined && others.is_finite() {
             one.recall(*log_evidence, others);
-            one.settle(others);
+            best = best.max(one.recent);
         } else {
             one.weigh(*log_evidence);
+        }
+    }
+    for (one, (is_undetermined, _)) in hypotheses.iter_mut().zip(evidences) {
+        if *is_undetermined && others.is_finite() {
+            one.settle(others, best);
         }
     }
 }

@@ -11,6 +11,8 @@ pub(super) struct Collected {
     pub(super) range: f64,
     /// Seconds since it was taken.
     pub(super) age: f64,
+    /// Its noise, as a share of the bank's.
+    pub(super) share: f64,
     /// What the range changes by for a change of the distance of one.
     pub(super) slope: f64,
 }
@@ -19,16 +21,19 @@ pub(super) struct Collected {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Latest {
     pub(super) time: f64,
-    range: f64,
+    pub(super) range: f64,
+    /// Its noise, as a share of the bank's.
+    pub(super) share: f64,
     /// What the target moved since.
     pub(super) moved: [f64; 3],
 }
 
 impl Latest {
-    pub(super) fn new(time: f64, range: f64) -> Self {
+    pub(super) fn new(time: f64, range: f64, share: f64) -> Self {
         Self {
             time,
             range,
+            share,
             moved: [0.0; 3],
         }
     }
@@ -41,6 +46,7 @@ impl Latest {
             anchor,
             place,
             range: self.range,
+            share: self.share,
             age: time - self.time,
             slope: measured.slope_at(self.range),
         }
@@ -69,7 +75,9 @@ impl<'a> Rows<'a> {
             ranges,
             variances: ranges
                 .iter()
-                .map(|one| noise * noise + (speed * one.age * one.slope).powi(2) + own.of(one.anchor).powi(2))
+                .map(|one| {
+                    (one.share * noise).powi(2) + (speed * one.age * one.slope).powi(2) + own.of(one.anchor).powi(2)
+                })
                 .collect(),
             slice,
         }

@@ -217,7 +217,26 @@ impl Known {
     }
 }
 
+/// The root mean square of the distances of places from their middle.
+fn spread_of(places: &[Vector3<f64>]) -> f64 {
+    let count = places.len() as f64;
+    let middle = places.iter().sum::<Vector3<f64>>() / count;
+    (places.iter().map(|place| (place - middle).norm_squared()).sum::<f64>() / count).sqrt()
+}
+
 impl RangeSettings {
+    /// The same for a target whose speeds among these anchors, if none is stated, are so many times slower, and last so many times longer.
+    #[must_use]
+    pub fn slower(self, anchors: &[Vector3<f64>], times: f64) -> Self {
+        let unsaid = shares::SPEED * spread_of(anchors) / times;
+        Self {
+            speed: self.speed.or(Some(unsaid)),
+            speed_factor: self.speed_factor.or(self.speed.is_none().then_some(shares::SPEEDS)),
+            persistence: times * self.persistence,
+            ..self
+        }
+    }
+
     /// Checks the settings and gives each a number.
     pub(super) fn known(&self, anchors: &[Vector3<f64>]) -> Result<Known, Error> {
         for place in anchors {
@@ -225,7 +244,7 @@ impl RangeSettings {
         }
         let count = anchors.len() as f64;
         let middle = anchors.iter().sum::<Vector3<f64>>() / count;
-        let spread = (anchors.iter().map(|place| (place - middle).norm_squared()).sum::<f64>() / count).sqrt();
+        let spread = spread_of(anchors);
         if anchors.iter().all(|place| *place == anchors[0]) {
             return refuse("anchors", "all at one place", "anchors at different places");
         }
