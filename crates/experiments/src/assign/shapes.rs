@@ -22,8 +22,8 @@ parameters! {
 
 rows! {
     pub struct Landing {
-        x: f64 ["V"] as x("source x / V") => "Source.",
-        f: [f64; BITS] ["V"] as line("bit {} wrong") => "Estimate with the bit of this number wrong, the coarsest being 1.",
+        x: f64 ["V"] => "Source.",
+        f: [f64; BITS] ["V"] => "Estimate with the bit of this number wrong, the coarsest being 1.",
     }
 }
 
@@ -60,6 +60,10 @@ impl Figure for Landings {
     fn claims(&self, _: &LandingParameters, tables: &Landed, claims: &mut Claims) {
         let here = claims.at_defaults();
         let centre = |x: f64| tables.centres.iter().find(|l| (l.x - x).abs() < 1e-14);
+        claims.all("involution", "flipping a bit twice returns to the centre", &tables.centres, |l| {
+            let back = |bit: usize| centre(l.f[bit]).is_some_and(|there| (there.f[bit] - l.x).abs() < 1e-14);
+            (0..BITS).all(back)
+        });
         let what = "every curve takes exactly the sixteen centres as values";
         here.all("staircase", what, 0..BITS, |bit| {
             let mut values: Vec<f64> = tables.curve.iter().map(|l| l.f[bit]).collect();
@@ -70,8 +74,14 @@ impl Figure for Landings {
     }
 
     fn plot(&self, _: &LandingParameters, tables: &Landed) -> Plot {
-        let axes: Named<'_> = ("", "", &|title, x| Panel::linear(title, x, "estimate / V"));
-        plotted(&tables.curve, "Where a wrong bit lands", &[axes])
+        let panel = |bit: usize| {
+            let (x, y) = (Axis::linear("source x / V"), Axis::linear("estimate / V").between(-1.1, 1.1));
+            Panel::new(format!("Bit {} wrong", bit + 1), x, y)
+                .with(Layer::line("", points(&tables.curve, |l| (l.x, l.f[bit]))).coloured(0))
+                .with(Layer::dashed("", vec![(-1.0, -1.0), (1.0, 1.0)]).coloured(7))
+                .without_legend()
+        };
+        Plot::grid(2, (0..BITS).map(panel).collect())
     }
 }
 
@@ -115,6 +125,8 @@ impl Figure for BitErrors {
         here.near("half", "the sign bit is a coin at zero", near(0.0), 0.5, 1e-12);
         claims
             .references("pa1", "the sign bit is wrong with this probability, x =", [0.2], |x| (x.to_string(), near(x)));
+        let what = "all values are probabilities";
+        claims.all("probabilities", what, rows, |r| r.pa.iter().all(|p| (0.0..=1.0).contains(p)));
         let mean = |bit: usize| rows.iter().map(|r| r.pa[bit]).sum::<f64>() / rows.len() as f64;
         here.increasing("order", "finer bits are wrong more often on average", (0..BITS).map(mean));
     }

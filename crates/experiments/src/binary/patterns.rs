@@ -86,6 +86,11 @@ impl Figure for Clipping {
         let errors = errors.map(|(rule, mse)| Rule { rule, mse }).into();
         Ok(Clipped { cells, errors })
     }
+
+    fn claims(&self, _: &ClippingParameters, tables: &Clipped, claims: &mut Claims) {
+        let what = "the cell never decreases with the measurement";
+        claims.all("monotone", what, tables.cells.windows(2), |w| w[1].cell >= w[0].cell);
+    }
 }
 
 rows! {

@@ -26,11 +26,11 @@ rows! {
     struct Band {
         t: f64 ["s"] => "Time.",
         c_star: f64 ["kg/m^3"] => "Threshold.",
-        direction_deg: f64 ["deg"] as x("direction / deg") => "Direction from the alarm node.",
-        r05: f64 ["m"] as dashed("5 %") => "How far the area reaches: 5 per cent quantile.",
-        r50: f64 ["m"] as line("median") => "Median.",
-        r95: f64 ["m"] as dashed("95 %") => "95 per cent quantile.",
-        truth: f64 ["m"] as points("truth") => "The truth.",
+        direction_deg: f64 ["deg"] => "Direction from the alarm node.",
+        r05: f64 ["m"] => "How far the area reaches: 5 per cent quantile.",
+        r50: f64 ["m"] => "Median.",
+        r95: f64 ["m"] => "95 per cent quantile.",
+        truth: f64 ["m"] => "The truth.",
     }
 
     struct Coverage by "{edge}" {
@@ -137,6 +137,10 @@ impl Figure for Envelope {
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let full = claims.at_full_trials();
+        claims.all("ordered", "quantiles are ordered", &rows.band, |b| b.r05 <= b.r50 && b.r50 <= b.r95);
+        claims.all("probabilities", "exceedances are probabilities", &rows.exceedance, |e| {
+            (0.0..=1.0 + 1e-9).contains(&e.p_exceed)
+        });
         for c in &rows.coverage {
             let what = format!("nine bands in ten hold the true edge: {}", c.edge);
             full.within(format!("calibrated/{}", c.edge), what, c.coverage, 0.9, 4.0);
@@ -159,8 +163,13 @@ impl Figure for Envelope {
         )
         .with(Layer::heat("P(c > threshold)", centres.clone(), centres, values))
         .with(Layer::dashed("true edge", circle.collect()).coloured(3));
-        let title = format!("Reach from the alarm node after {} s", p.time);
-        let reach = plotted(&rows.band, &title, &[("", "", &|title, x| Panel::linear(title, x, "reach / m"))]);
-        Plot::grid(2, [vec![map], reach.panels].concat())
+        let of = |f: fn(&Band) -> f64| rows.band.iter().map(|b| (b.direction_deg, f(b))).collect::<Vec<_>>();
+        let limits = rows.band.iter().map(|b| (b.direction_deg, b.r05, b.r95)).collect();
+        let band =
+            Panel::linear(format!("Reach from the alarm node after {} s", p.time), "direction / deg", "reach / m")
+                .with(Layer::band("90 % band", limits).coloured(0))
+                .with(Layer::line("median", of(|b| b.r50)).coloured(0))
+                .with(Layer::dashed("truth", of(|b| b.truth)).coloured(3));
+        Plot::grid(2, vec![map, band])
     }
 }

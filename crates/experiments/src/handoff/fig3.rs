@@ -21,15 +21,15 @@ rows! {
     }
 
     struct Density {
-        x: f64 as x("state x") => "State.",
-        p0: f64 as line("p0") in densities => "First density.",
-        p1: f64 as line("p1") in densities => "Second density.",
+        x: f64 => "State.",
+        p0: f64 => "First density.",
+        p1: f64 => "Second density.",
     }
 
     struct Distance by "{when}" {
-        when: &'static str as x("") => "When: prior, y0, y1 (given the measurement), expected.",
+        when: &'static str => "When: prior, y0, y1 (given the measurement), expected.",
         probability: f64 => "Probability of the case under the first density.",
-        l1: f64 as points("L1") in l1 => "L1 of the two densities.",
+        l1: f64 => "L1 of the two densities.",
     }
 }
 
@@ -44,8 +44,7 @@ pub struct Fig3;
 impl Figure for Fig3 {
     figure!(Parameters => Rows, "handoff-fig3", "One bit turns a small error into the largest", "compressed particle filter, Section 4, Figure 3",
         "Two densities that differ in where a lobe of a tenth of the mass lies: L1 0.2. A bit that points at the lobe \
-         makes them disjoint, L1 2; it comes with probability 0.1, so the expected error has not grown.";
-        { densities: linear("density", "Two densities"), l1: linear("L1", "Error before and after the bit") });
+         makes them disjoint, L1 2; it comes with probability 0.1, so the expected error has not grown.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let lobe = |w: f64, m: f64, s: f64| Component::new(w, Vector1::new(m), Matrix1::new(s * s));
@@ -91,5 +90,18 @@ impl Figure for Fig3 {
         claims.at_most("twice", "the expected L1 is at most twice the prior's", gap, 0.0);
         let here = claims.at_defaults();
         here.above("largest", "one answer leaves the largest L1 there is, nearly 2", rows.l1("y1"), 1.999);
+    }
+
+    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
+        let density = Panel::linear("Two densities", "state x", "density")
+            .with(Layer::line("p0", points(&rows.densities, |d| (d.x, d.p0))))
+            .with(Layer::line("p1", points(&rows.densities, |d| (d.x, d.p1))))
+            .with(Layer::dashed("threshold", vec![(p.threshold, 0.0), (p.threshold, 7.0)]));
+        let names = Axis::categories("", rows.l1.iter().map(|d| d.when));
+        let each = rows.l1.iter().enumerate().map(|(i, d)| (i as f64, d.l1)).collect();
+        let distance = Panel::new("Error before and after the bit", names, Axis::linear("L1").between(-0.1, 2.1))
+            .with(Layer::points("", each))
+            .without_legend();
+        Plot::grid(2, vec![density, distance])
     }
 }

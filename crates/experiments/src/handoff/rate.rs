@@ -19,11 +19,11 @@ parameters! {
 rows! {
     pub struct Row by name {
         /// What is sent: coded, f32 (mixture parameters as floats), coded-kd (a cut by KL, coded), particles (f32, resampled).
-        message: &'static str as key,
+        message: &'static str,
         size: usize => "Components, or particles.",
         resolution: Option<f64> => "Quantiser step in standard deviations, if coded.",
-        bits: Measured ["bit"] as x("message / bit") => "Mean length.",
-        kl: Measured ["nat"] as points => "KL from the estimate to what the receiver knows.",
+        bits: Measured ["bit"] => "Mean length.",
+        kl: Measured ["nat"] => "KL from the estimate to what the receiver knows.",
     }
 }
 
@@ -38,7 +38,7 @@ fn name(row: &Row) -> String {
 impl Figure for Rate {
     figure!(Parameters => Vec<Row>, "handoff-rate", "What bits buy", "our own comparison",
         "KL from the estimate to what the receiver decodes against the length of the message. Coded mixtures need a \
-         seventh of the bits of their parameters as floats, and a hundredth of those of particles."; loglog("KL / nat"));
+         seventh of the bits of their parameters as floats, and a hundredth of those of particles.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         // A message format has at most 16 resolutions of which one is chosen in the message; here both ends agree on it.
@@ -98,5 +98,19 @@ impl Figure for Rate {
             let what = "at the same bits the pipeline loses less than the paper's cut";
             paper.below(format!("pipeline-m{m}"), what, gap, 0.0);
         }
+    }
+
+    fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
+        let place = |r: &Row| (r.bits.value, r.kl);
+        let of = |size: usize| select(rows, move |r| r.message == "coded" && r.size == size);
+        let all = |message: &'static str| select(rows, move |r| r.message == message);
+        let coded = p.components.iter().enumerate();
+        let layers =
+            coded.flat_map(|(i, m)| Layer::curve(format!("coded, {m} components"), i, of(*m).map(place).collect()));
+        let panel = Panel::loglog("One belief", "message / bit", "KL / nat")
+            .with_all(layers)
+            .with(Layer::dashed("mixture as floats", points(all("f32"), place)).coloured(5))
+            .with(Layer::measured("particles as floats", all("particles"), place).coloured(6));
+        Plot::of(panel)
     }
 }
