@@ -169,7 +169,7 @@ impl<const M: usize> Censored<M> {
     /// If a number is not finite, or the level's cell lies within the interval of silence.
     pub(crate) fn level(
         value: f64,
-        levels: &number::Levels,
+        levels: &number::EvenLevels,
         rule: &CensoringRule<M>,
         prediction: f64,
         noise_variance: f64,

@@ -7,7 +7,7 @@ use fewbits_binary_patterns::{
 use fewbits_core::Observation;
 use fewbits_numerics::error::{entries, positive, refuse};
 use fewbits_numerics::quadrature::gauss_legendre;
-use fewbits_quantizer_design::outcomes::{Feature, Table, explained, moments};
+use fewbits_quantizer_design::outcomes::{NodeWeights, Table, explained, moments};
 
 /// The estimator whose exact error is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -158,10 +158,10 @@ impl CodedSensors {
 
     /// Weights of probability and first moment. The nodes cover one side, with the weight of both.
     #[doc(hidden)]
-    pub fn features(&self) -> [Feature; 2] {
+    pub fn features(&self) -> [NodeWeights; 2] {
         let mass: Vec<f64> = self.nodes.w.iter().map(|w| 0.5 * w).collect();
         let moment = mass.iter().zip(&self.nodes.x).map(|(w, x)| w * x).collect();
-        [Feature::of_all(mass), Feature::of_all(moment)]
+        [NodeWeights::of_all(mass), NodeWeights::of_all(moment)]
     }
 
     /// Exact error of the decoder that reads the Gray bits as a cell index and returns the cell's centre.

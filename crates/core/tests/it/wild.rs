@@ -1,6 +1,6 @@
 //! Wild arguments: every constructor and step of this crate returns numbers or an error.
 
-use fewbits_core::factor::{Constant, Factor, Levels, Product, Repeated, Robust, Scalar, Tilted, Value};
+use fewbits_core::factor::{Constant, Factor, Levels, Product, Repeated, Scalar, Tilted, Value};
 use fewbits_core::number;
 use fewbits_core::{BitString, Cell, Gaussian, Link, NumberFormat, Observation, Sign};
 use nalgebra::{Matrix2, SMatrix, Vector1, Vector2};
@@ -57,9 +57,6 @@ proptest! {
         for factor in &all {
             check(factor, [x[3]], prior.as_ref(), resolved(x[3]));
             check(factor, [x[7]], prior.as_ref(), resolved(x[7]));
-            if let Ok(robust) = Robust::new(factor.clone(), x[1], x[0]) {
-                check(&robust, [x[3]], prior.as_ref(), resolved(x[3]));
-            }
             if let Ok(repeated) = Repeated::new(factor.clone(), count) {
                 check(&repeated, [x[3]], prior.as_ref(), resolved(x[3]));
             }
