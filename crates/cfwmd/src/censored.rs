@@ -96,24 +96,6 @@ impl<const M: usize> Censored<M> {
         Self::scaled(joint, separate - joint.log_likelihood(&mean) + count * arrival.ln())
     }
 
-    /// Nothing arrived from `count` identical sensors. Each is silent by `rule` about `prediction`; its noise covariance is `R = noise`.
-    ///
-    /// # Errors
-    /// As [`Censored::missing`].
-    pub fn silence(
-        rule: &CensoringRule<M>,
-        prediction: &SVector<f64, M>,
-        noise: &SMatrix<f64, M, M>,
-        link: &Link,
-        count: usize,
-    ) -> Result<Self, ArgumentError> {
-        let silent = MissingReports {
-            nothing: count,
-            lost: 0,
-        };
-        Self::missing(rule, prediction, noise, link, silent)
-    }
-
     /// Missing reports of identical sensors. Each is silent by `rule` about `prediction`; its noise covariance is `R = noise`.
     ///
     /// # Errors

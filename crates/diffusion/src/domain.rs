@@ -279,15 +279,6 @@ impl Domain {
         Ok(Patch { shares })
     }
 
-    /// Number of the connected part of each free cell, and the number of parts.
-    pub fn parts(&self) -> (Vec<usize>, usize) {
-        let (mut number, parts) = (vec![0; self.free.len()], self.walk());
-        for (k, part) in parts.iter().enumerate() {
-            part.iter().for_each(|(cell, _)| number[*cell] = k);
-        }
-        (number, parts.len())
-    }
-
     /// The cells of each connected part in the order of a search. Each has the face from which it was reached; the first has none.
     pub(crate) fn walk(&self) -> Vec<Vec<(usize, Option<usize>)>> {
         let mut above = vec![[0; 3]; self.free.len()];

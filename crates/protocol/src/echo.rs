@@ -18,7 +18,7 @@ pub enum ReportLength {
 
 impl ReportLength {
     /// Whether a report may have this many bits.
-    pub fn allows(self, bits: usize) -> bool {
+    pub(crate) fn allows(self, bits: usize) -> bool {
         match self {
             Self::Fixed(expected) => bits == expected as usize,
             Self::Varying => bits < 1 << LENGTH_BITS,

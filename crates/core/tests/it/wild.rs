@@ -95,7 +95,7 @@ proptest! {
 
     #[test]
     fn formats_of_wild_numbers_are_refused_or_hold_numbers(x in prop::array::uniform3(wild()), bits in 0..70_u32, bytes in prop::collection::vec(any::<u8>(), 0..20), length in any::<usize>()) {
-        if let Ok(levels) = number::Levels::new(x[0], x[1], bits) {
+        if let Ok(levels) = number::EvenLevels::new(x[0], x[1], bits) {
             if let Ok(rounded) = NumberFormat::Fixed(levels).rounded(x[2]) {
                 prop_assert!(rounded.is_finite() && rounded >= x[0] && rounded <= x[1]);
             }

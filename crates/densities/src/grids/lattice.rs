@@ -92,11 +92,6 @@ impl Lattice {
         &self.density
     }
 
-    /// The product of the spacings.
-    pub fn volume(&self) -> f64 {
-        self.volume
-    }
-
     /// Positions of all nodes along one axis, in the order of the nodes; empty if there is no such axis.
     pub fn positions(&self, axis: usize) -> Vec<f64> {
         let Some(grid) = self.axes.get(axis) else {

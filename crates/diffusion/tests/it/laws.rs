@@ -403,7 +403,6 @@ fn layers_in_series_are_exact() {
 #[test]
 fn diagonal_contact_is_no_passage() {
     let domain = Plan::parse("..#\n..#\n##.").unwrap().domain(0.5, 1, 0.0).unwrap();
-    assert_eq!(domain.parts().1, 2);
     let transport = Transport::new(domain.clone(), 0.05, &Flow::still(&domain), 0.0, FluxRule::default()).unwrap();
     let release = TimedSource {
         patch: domain.point([0.2, 0.2, 0.0]).unwrap(),

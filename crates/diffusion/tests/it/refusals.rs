@@ -24,9 +24,10 @@ fn grids_are_checked() {
     );
     assert!(Grid::new(&[vec![0.0, f64::NAN]]).is_err());
     let grid = Grid::new(&[vec![0.0, 0.1, 0.4], vec![-1.0, 2.0]]).unwrap();
-    assert_eq!(grid.cell_at([0.1, 0.0, 99.0]), Some(1));
-    assert_eq!(grid.cell_at([0.4, 2.0, 0.0]), Some(1));
-    assert_eq!(grid.cell_at([0.41, 0.0, 0.0]), None);
+    let domain = Domain::new(grid, &[CellKind::Free; 2], [[Boundary::Closed; 2]; 3]).unwrap();
+    assert_eq!(domain.locate([0.1, 0.0, 99.0]), Ok(1));
+    assert_eq!(domain.locate([0.4, 2.0, 0.0]), Ok(1));
+    assert!(domain.locate([0.41, 0.0, 0.0]).is_err());
 }
 
 #[test]
