@@ -7,7 +7,7 @@ use crate::stored::{self, Reduced, maker};
 use crate::table::{Table, doubles};
 use arrow_array::{ArrayRef, Int64Array, StringArray};
 use fewbits_diffusion::{
-    Flow, LeakBelief, LeakPrior, Plan, PotentialFlow, Reading, FluxRule, SensorField, StepControl, Transport,
+    Flow, FluxRule, LeakBelief, LeakPrior, Plan, PotentialFlow, Reading, SensorField, StepControl, Transport,
 };
 use fewbits_diffusive::{Error, RateModel, RateRange, Search, SearchBox, SearchField, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground};
