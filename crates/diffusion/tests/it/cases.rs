@@ -191,7 +191,7 @@ impl Model {
                 let seen = |from: &Value, to: &Value| self.square(to).mean(&self.concentration(from));
                 vec![seen(there, back), seen(back, there)]
             }
-            "balance" => {
+            "budget" => {
                 let balance = self.transport.balance(&self.concentration(&entry["source"])).unwrap();
                 assert!((balance.removed() - 1.0).abs() < 1e-10, "{} of 1 is accounted for", balance.removed());
                 let part = |name: &Value| match name.as_str().unwrap() {
