@@ -7,7 +7,7 @@ use crate::stored::{self, Reduced, maker};
 use crate::table::{Table, doubles};
 use arrow_array::{ArrayRef, Int64Array, StringArray};
 use fewbits_diffusion::{
-    Flow, LeakBelief, LeakPrior, Plan, PotentialFlow, Reading, Scheme, SensorField, StepControl, Transport,
+    Flow, FluxRule, LeakBelief, LeakPrior, Plan, PotentialFlow, Reading, SensorField, StepControl, Transport,
 };
 use fewbits_diffusive::{Error, RateModel, RateRange, Search, SearchBox, SearchField, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground};
@@ -415,7 +415,7 @@ fn rooms(
         0.0 => Flow::still(&domain),
         flow => PotentialFlow::new(&domain, flow)?.flow,
     };
-    let transport = Transport::new(domain, diffusivity, &wind, 0.0, Scheme::default())?;
+    let transport = Transport::new(domain, diffusivity, &wind, 0.0, FluxRule::default())?;
     let points: Vec<[f64; 3]> = places.iter().map(|place| [place.x, place.y, 0.0]).collect();
     Ok(SensorField::transient(&transport, &points, ages, StepControl::default())?)
 }

@@ -161,7 +161,14 @@ fn particles_1000(bencher: Bencher<'_, '_>, silent: usize) {
 #[divan::bench]
 fn scalar_factors_1000(bencher: Bencher<'_, '_>) {
     let rule = CensoringRule::scalar(1.8 * 1.8, 1.0).unwrap();
-    let factor = Censored::silence(&rule, &Vector1::zeros(), &Matrix1::new(1.0), &Link::PERFECT, 1).unwrap();
+    let factor = Censored::missing(
+        &rule,
+        &Vector1::zeros(),
+        &Matrix1::new(1.0),
+        &Link::PERFECT,
+        MissingReports { nothing: 1, lost: 0 },
+    )
+    .unwrap();
     let values: Vec<f64> = (0..1000).map(|i| f64::from(i) * 0.006 - 3.0).collect();
     let mut sums = vec![0.0; 1000];
     bencher.bench_local(|| {

@@ -96,24 +96,6 @@ impl<const M: usize> Censored<M> {
         Self::scaled(joint, separate - joint.log_likelihood(&mean) + count * arrival.ln())
     }
 
-    /// Nothing arrived from `count` identical sensors. Each is silent by `rule` about `prediction`; its noise covariance is `R = noise`.
-    ///
-    /// # Errors
-    /// As [`Censored::missing`].
-    pub fn silence(
-        rule: &CensoringRule<M>,
-        prediction: &SVector<f64, M>,
-        noise: &SMatrix<f64, M, M>,
-        link: &Link,
-        count: usize,
-    ) -> Result<Self, ArgumentError> {
-        let silent = MissingReports {
-            nothing: count,
-            lost: 0,
-        };
-        Self::missing(rule, prediction, noise, link, silent)
-    }
-
     /// Missing reports of identical sensors. Each is silent by `rule` about `prediction`; its noise covariance is `R = noise`.
     ///
     /// # Errors
@@ -169,7 +151,7 @@ impl<const M: usize> Censored<M> {
     /// If a number is not finite, or the level's cell lies within the interval of silence.
     pub(crate) fn level(
         value: f64,
-        levels: &number::Levels,
+        levels: &number::EvenLevels,
         rule: &CensoringRule<M>,
         prediction: f64,
         noise_variance: f64,

@@ -210,12 +210,6 @@ impl BitWriter {
         let _ = BitReader::new(message).read_into(message.bits, self);
     }
 
-    /// Writes one bit.
-    pub fn write_bit(&mut self, bit: bool) {
-        // A one-bit field always fits.
-        let _ = self.write(u64::from(bit), 1);
-    }
-
     /// Empties the writer and keeps its memory.
     pub fn clear(&mut self) {
         self.message.bytes.clear();
@@ -315,14 +309,6 @@ impl<'a> BitReader<'a> {
             left -= width as usize;
         }
         Ok(())
-    }
-
-    /// Reads one bit.
-    ///
-    /// # Errors
-    /// If none is left.
-    pub fn read_bit(&mut self) -> Result<bool, CodecError> {
-        Ok(self.read(1)? == 1)
     }
 
     /// Confirms that the message was read to its end.

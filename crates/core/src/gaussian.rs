@@ -120,22 +120,13 @@ impl<const D: usize> Gaussian<D> {
         Ok(self.factored()?.log_pdf(x))
     }
 
-    /// Squared Mahalanobis distance `(x - mean)' P^-1 (x - mean)`: of the truth from a consistent belief it has expectation `D`;
-    /// [`Gaussian::normalised_error_squared`] is the same over `D`.
-    ///
-    /// # Errors
-    /// If the covariance is singular.
-    pub fn mahalanobis_squared(&self, x: &SVector<f64, D>) -> Result<f64, ArgumentError> {
-        let deviation = x - self.mean;
-        Ok(deviation.dot(&self.cholesky()?.solve(&deviation)))
-    }
-
     /// Normalised estimation error squared (NEES), `(x - mean)' P^-1 (x - mean) / D`: expectation 1 for a consistent belief.
     ///
     /// # Errors
     /// If the covariance is singular.
     pub fn normalised_error_squared(&self, truth: &SVector<f64, D>) -> Result<f64, ArgumentError> {
-        Ok(self.mahalanobis_squared(truth)? / D as f64)
+        let deviation = truth - self.mean;
+        Ok(deviation.dot(&self.cholesky()?.solve(&deviation)) / D as f64)
     }
 
     /// Kullback-Leibler divergence `KL(self || other)` in nats.

@@ -58,7 +58,7 @@ impl Message for bool {
     }
 
     fn decode((): &(), reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
-        reader.read_bit()
+        Ok(reader.read(1)? == 1)
     }
 }
 

@@ -19,20 +19,20 @@ pub enum NumberFormat {
     /// 32-bit floating point.
     Single,
     /// The index of one of `2^bits` evenly spaced levels.
-    Fixed(Levels),
+    Fixed(EvenLevels),
 }
 
 /// `2^bits` evenly spaced levels from `lower` to `upper`, ends included. A value is rounded to the nearest level; values beyond the ends
 /// are rounded to the ends.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Numbers")]
-pub struct Levels {
+pub struct EvenLevels {
     lower: f64,
     upper: f64,
     bits: u32,
 }
 
-/// The stored form of [`Levels`].
+/// The stored form of [`EvenLevels`].
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Numbers {
@@ -41,15 +41,15 @@ struct Numbers {
     bits: u32,
 }
 
-impl TryFrom<Numbers> for Levels {
+impl TryFrom<Numbers> for EvenLevels {
     type Error = ArgumentError;
 
     fn try_from(parts: Numbers) -> Result<Self, ArgumentError> {
-        Levels::new(parts.lower, parts.upper, parts.bits)
+        EvenLevels::new(parts.lower, parts.upper, parts.bits)
     }
 }
 
-impl Levels {
+impl EvenLevels {
     /// The levels from `lower` to `upper` (measurement units), `bits` of 1 to 32.
     ///
     /// # Errors
@@ -106,9 +106,9 @@ impl NumberFormat {
     /// The format of `2^bits` evenly spaced levels from `lower` to `upper`.
     ///
     /// # Errors
-    /// As [`Levels::new`].
+    /// As [`EvenLevels::new`].
     pub fn fixed(lower: f64, upper: f64, bits: u32) -> Result<Self, ArgumentError> {
-        Ok(Self::Fixed(Levels::new(lower, upper, bits)?))
+        Ok(Self::Fixed(EvenLevels::new(lower, upper, bits)?))
     }
 
     /// Bits of one number.
@@ -318,7 +318,7 @@ impl<const D: usize> Message for RoundedGaussian<D> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Levels, NumberFormat, RoundedGaussian};
+    use super::{EvenLevels, NumberFormat, RoundedGaussian};
     use crate::bits::BitString;
     use crate::gaussian::Gaussian;
     use crate::laws::message::{decoding_is_total, round_trip};
@@ -352,15 +352,15 @@ mod tests {
 
     #[test]
     fn cells_of_levels_partition_the_line() {
-        let levels = Levels::new(-2.0, 5.0, 2).unwrap();
+        let levels = EvenLevels::new(-2.0, 5.0, 2).unwrap();
         let cells: Vec<_> = (0..4).map(|i| levels.cell(levels.level(i)).unwrap()).collect();
         assert_eq!((cells[0].lower(), cells[3].upper()), (f64::NEG_INFINITY, f64::INFINITY));
         for pair in cells.windows(2) {
             assert!((pair[0].upper() - pair[1].lower()).abs() < 1e-15);
         }
-        assert!(Levels::new(0.0, 1.0, 0).is_err() && Levels::new(0.0, 1.0, 64).is_err());
-        assert!(Levels::new(1.0, 1.0, 4).is_err() && Levels::new(-1e308, 1e308, 4).is_err());
-        assert!(serde_json::from_str::<Levels>(r#"{"lower":1,"upper":0,"bits":4}"#).is_err());
+        assert!(EvenLevels::new(0.0, 1.0, 0).is_err() && EvenLevels::new(0.0, 1.0, 64).is_err());
+        assert!(EvenLevels::new(1.0, 1.0, 4).is_err() && EvenLevels::new(-1e308, 1e308, 4).is_err());
+        assert!(serde_json::from_str::<EvenLevels>(r#"{"lower":1,"upper":0,"bits":4}"#).is_err());
     }
 
     #[test]

@@ -70,6 +70,6 @@ impl Message for Sign {
     }
 
     fn decode((): &(), reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
-        Ok(if reader.read_bit()? { Self::Above } else { Self::Below })
+        Ok(if reader.read(1)? == 1 { Self::Above } else { Self::Below })
     }
 }

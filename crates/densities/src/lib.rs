@@ -69,5 +69,5 @@ pub use fewbits_core::Error;
 pub use grids::{Lattice, PointMass, UniformGrid};
 pub use kernel_estimate::{Bandwidth, BandwidthRule, KernelEstimate, SampleSize, Shape, add_cross_sums};
 pub use mixture::{Component, Mixture, ellipse, moment_matched};
-pub use particles::{Categorical, GaussianCloud, Particles, normalise_log_weights, systematic, systematic_into};
+pub use particles::{Categorical, GaussianCloud, Particles, systematic, systematic_into};
 pub use {nalgebra, rand};

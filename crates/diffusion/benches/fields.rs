@@ -4,7 +4,7 @@
 
 use divan::{Bencher, black_box};
 use faer::sparse::{SparseColMat, Triplet};
-use fewbits_diffusion::{Boundary, Cell, Domain, Grid, PotentialFlow, Scheme, SensorField, Steady, Transport};
+use fewbits_diffusion::{Boundary, CellKind, Domain, FluxRule, Grid, PotentialFlow, SensorField, Steady, Transport};
 
 /// Cells along an axis.
 const SIDE: usize = 300;
@@ -14,18 +14,18 @@ fn main() {
 }
 
 /// A square of 30 m with wind from left to right past a wall.
-fn transport(scheme: Scheme) -> Transport {
+fn transport(scheme: FluxRule) -> Transport {
     let grid = Grid::uniform(&[SIDE, SIDE], 0.1).unwrap();
     let wall = |cell: usize| grid.place(cell)[0] == SIDE / 3 && grid.place(cell)[1] < SIDE / 2;
     let cells = (0..SIDE * SIDE).map(|cell| {
         if wall(cell) {
-            Cell::Blocked(Boundary::Closed)
+            CellKind::Blocked(Boundary::Closed)
         } else {
-            Cell::Free
+            CellKind::Free
         }
     });
     let closed = [Boundary::Closed; 2];
-    let cells: Vec<Cell> = cells.collect();
+    let cells: Vec<CellKind> = cells.collect();
     let domain = Domain::new(grid, &cells, [[Boundary::Inflow, Boundary::Outflow], closed, closed]).unwrap();
     let wind = PotentialFlow::new(&domain, 1.0).unwrap().flow;
     Transport::new(domain, 0.05, &wind, 0.0, scheme).unwrap()
@@ -65,16 +65,16 @@ fn plain_lu_unit(bencher: Bencher) {
 }
 
 /// Ordering and factorisation: upwind is not symmetric, exponential fitting in potential flow is.
-#[divan::bench(args = [Scheme::Upwind, Scheme::ExponentialFitting], sample_count = 5, sample_size = 1)]
-fn factor(bencher: Bencher, scheme: Scheme) {
+#[divan::bench(args = [FluxRule::Upwind, FluxRule::ExponentialFitting], sample_count = 5, sample_size = 1)]
+fn factor(bencher: Bencher, scheme: FluxRule) {
     bencher.with_inputs(|| transport(scheme)).bench_refs(|transport| {
         black_box(Steady::new(transport).unwrap());
     });
 }
 
 /// The matrix, ordering, factorisation and 50 adjoint solutions.
-#[divan::bench(args = [Scheme::Upwind, Scheme::ExponentialFitting], sample_count = 5, sample_size = 1)]
-fn field_of_50_sensors(bencher: Bencher, scheme: Scheme) {
+#[divan::bench(args = [FluxRule::Upwind, FluxRule::ExponentialFitting], sample_count = 5, sample_size = 1)]
+fn field_of_50_sensors(bencher: Bencher, scheme: FluxRule) {
     let points: Vec<[f64; 3]> = (0..50)
         .map(|i| [0.45 + 0.55 * f64::from(i), 0.45 + 0.5 * f64::from(i * 7 % 50), 0.0])
         .collect();

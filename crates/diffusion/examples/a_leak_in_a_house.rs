@@ -2,7 +2,7 @@
 //!
 //! `cargo run --example a_leak_in_a_house [PLAN]`: the plan is `examples/house.txt` unless another is named.
 
-use fewbits_diffusion::{Plan, PotentialFlow, Scheme, Source, Steady, Transport};
+use fewbits_diffusion::{FluxRule, Plan, PotentialFlow, Source, Steady, Transport};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args()
@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .map(|at| domain.point(at))
         .collect::<Result<Vec<_>, _>>()?;
     let leak = domain.point([1.6, 1.6, 0.0])?;
-    let transport = Transport::new(domain, 0.05, &wind.flow, 0.0, Scheme::default())?;
+    let transport = Transport::new(domain, 0.05, &wind.flow, 0.0, FluxRule::default())?;
     let steady = Steady::new(&transport)?;
 
     // What the sensors read of a leak of 2 mg/s, and how much of it leaves where.
@@ -28,9 +28,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         rate: 2e-6,
     }])?;
     let readings: Vec<f64> = sensors.iter().map(|sensor| sensor.mean(&field)).collect();
-    let budget = transport.budget(&field)?;
+    let balance = transport.balance(&field)?;
     let shown: Vec<f64> = readings.iter().map(|c| 1e6 * c).collect();
-    println!("readings {shown:.2?} mg/m^3; out {:.1} %, in {:.1} %", 5e7 * budget.outflow, 5e7 * budget.inflow);
+    println!("readings {shown:.2?} mg/m^3; out {:.1} %, in {:.1} %", 5e7 * balance.outflow, 5e7 * balance.inflow);
 
     // For every cell the rate that fits best and what is left unexplained: adjoint solutions, one per sensor.
     let rows = steady.adjoint(&sensors)?;

@@ -1,6 +1,6 @@
 //! A room with a wind that was measured: velocities in cells are projected onto winds without divergence, then a puff is followed.
 
-use fewbits_diffusion::{Divergence, Error, Flow, Plan, Release, Scheme, Transient, Transport};
+use fewbits_diffusion::{Divergence, Error, Flow, FluxRule, Plan, TimedSource, Transient, Transport};
 
 fn main() -> Result<(), Error> {
     let plan = Plan::parse(
@@ -23,17 +23,17 @@ fn main() -> Result<(), Error> {
         println!("{error}");
     }
     let wind = Flow::from_cells(&domain, &measured, Divergence::Project)?;
-    let release = Release {
+    let release = TimedSource {
         patch: domain.point([1.2, 1.4, 0.0])?,
         rate: 1e-6,
         start: 0.0,
         stop: 30.0,
     };
-    let transport = Transport::new(domain, 0.01, &wind, 0.0, Scheme::default())?;
+    let transport = Transport::new(domain, 0.01, &wind, 0.0, FluxRule::default())?;
     let nothing = vec![0.0; transport.domain().free().len()];
     for snapshot in Transient::new(&transport).run(&nothing, &[release], &[30.0, 60.0, 120.0])? {
         let (here, left) =
-            (transport.budget(&snapshot.concentration)?.mass, transport.budget(&snapshot.dose)?.removed());
+            (transport.balance(&snapshot.concentration)?.mass, transport.balance(&snapshot.dose)?.removed());
         println!(
             "{:>5} s: {:.2} mg in the room, {:.2} mg have left ({} steps)",
             snapshot.time,

@@ -21,7 +21,7 @@ pub enum Boundary {
 
 /// Kind of a cell of the grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Cell {
+pub enum CellKind {
     /// Air. Faces on the edge of the grid have the boundary condition of that side.
     Free,
     /// Air. Faces on the edge of the grid have this boundary condition.
@@ -70,11 +70,11 @@ impl Face {
 /// Two free cells that touch only at an edge or a corner exchange nothing.
 ///
 /// ```
-/// use fewbits_diffusion::{Boundary, Cell, Domain, Grid};
+/// use fewbits_diffusion::{Boundary, CellKind, Domain, Grid};
 /// // A room of 2 m by 1 m with an absorbing wall at x = 0.
 /// let grid = Grid::uniform(&[8, 4], 0.25)?;
 /// let closed = [Boundary::Closed; 2];
-/// let room = Domain::new(grid, &[Cell::Free; 32], [[Boundary::Absorbing, Boundary::Closed], closed, closed])?;
+/// let room = Domain::new(grid, &[CellKind::Free; 32], [[Boundary::Absorbing, Boundary::Closed], closed, closed])?;
 /// assert_eq!(room.free().len(), 32);
 /// # Ok::<(), fewbits_diffusion::Error>(())
 /// ```
@@ -105,20 +105,20 @@ impl Domain {
     ///
     /// # Errors
     /// If the number of cells is not that of the grid, a leak is negative or above 1e30 m/s, or [`Error::NoFreeCell`].
-    pub fn new(grid: Grid, cells: &[Cell], sides: [[Boundary; 2]; 3]) -> Result<Self, Error> {
+    pub fn new(grid: Grid, cells: &[CellKind], sides: [[Boundary; 2]; 3]) -> Result<Self, Error> {
         if cells.len() != grid.cells() {
             return refuse("cells", cells.len(), format!("{}, one for each cell of the grid", grid.cells()));
         }
         let of_cells = cells.iter().filter_map(|cell| match cell {
-            Cell::Free => None,
-            Cell::Open(boundary) | Cell::Blocked(boundary) => Some(boundary),
+            CellKind::Free => None,
+            CellKind::Open(boundary) | CellKind::Blocked(boundary) => Some(boundary),
         });
         for boundary in of_cells.chain(sides.as_flattened()) {
             if let Boundary::Leaking(leak) = boundary {
                 within("leak", *leak, 0.0, MAX_MAGNITUDE)?;
             }
         }
-        let is_free = |cell: &usize| !matches!(cells[*cell], Cell::Blocked(_));
+        let is_free = |cell: &usize| !matches!(cells[*cell], CellKind::Blocked(_));
         let free: Vec<usize> = (0..cells.len()).filter(is_free).collect();
         if free.is_empty() {
             return Err(Error::NoFreeCell);
@@ -135,7 +135,7 @@ impl Domain {
             for &(axis, upper) in ways[..grid.dimension()].as_flattened() {
                 let next = grid.next(at, axis, upper);
                 let boundary = match (next.map(|next| cells[grid.index(next)]), cells[*cell]) {
-                    (Some(Cell::Blocked(boundary)), _) | (None, Cell::Open(boundary)) => Some(boundary),
+                    (Some(CellKind::Blocked(boundary)), _) | (None, CellKind::Open(boundary)) => Some(boundary),
                     (Some(_), _) => None,
                     (None, _) => Some(sides[axis][usize::from(upper)]),
                 };
@@ -277,15 +277,6 @@ impl Domain {
         let total: f64 = shares.iter().map(|share| share.1).sum();
         shares.iter_mut().for_each(|share| share.1 /= total);
         Ok(Patch { shares })
-    }
-
-    /// Number of the connected part of each free cell, and the number of parts.
-    pub fn parts(&self) -> (Vec<usize>, usize) {
-        let (mut number, parts) = (vec![0; self.free.len()], self.walk());
-        for (k, part) in parts.iter().enumerate() {
-            part.iter().for_each(|(cell, _)| number[*cell] = k);
-        }
-        (number, parts.len())
     }
 
     /// The cells of each connected part in the order of a search. Each has the face from which it was reached; the first has none.

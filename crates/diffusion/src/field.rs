@@ -15,11 +15,11 @@ use std::sync::Arc;
 /// all ages above 0.
 ///
 /// ```
-/// use fewbits_diffusion::{Flow, Plan, Scheme, SensorField, Transport};
+/// use fewbits_diffusion::{Flow, Plan, FluxRule, SensorField, Transport};
 /// use fewbits_models::{SourceModel, nalgebra::Vector3};
 /// let domain = Plan::parse("I....#\n###..#\n.....O")?.domain(0.5, 2, 0.0)?;
 /// let still = Flow::still(&domain);
-/// let transport = Transport::new(domain, 0.05, &still, 0.0, Scheme::default())?;
+/// let transport = Transport::new(domain, 0.05, &still, 0.0, FluxRule::default())?;
 /// let field = SensorField::steady(&transport, &[[0.7, 1.2, 0.0]])?;
 /// let sensor = field.receptor(&Vector3::new(0.7, 1.2, 0.0))?;
 /// // Behind the wall, a metre away, a source is hardly measured.

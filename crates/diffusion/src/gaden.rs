@@ -1,6 +1,6 @@
 //! Rooms, winds and concentrations of the simulator GADEN, read from its text files: no ROS is needed.
 
-use crate::{Boundary, Cell, Divergence, Domain, Error, Flow, Grid};
+use crate::{Boundary, CellKind, Divergence, Domain, Error, Flow, Grid};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive, refuse};
 
@@ -28,7 +28,7 @@ pub struct Room {
     counts: [usize; 3],
     width: f64,
     /// In the order of a [`Grid`].
-    cells: Vec<Cell>,
+    cells: Vec<CellKind>,
 }
 
 /// The numbers of a line behind its name.
@@ -115,9 +115,9 @@ impl Room {
             }
         }
         let cells = layers(lines, counts, "cells", "0 (free), 1 (solid) or 2 (outlet)", |word| match word {
-            "0" => Some(Cell::Free),
-            "1" => Some(Cell::Blocked(Boundary::Closed)),
-            "2" => Some(Cell::Open(Boundary::Outflow)),
+            "0" => Some(CellKind::Free),
+            "1" => Some(CellKind::Blocked(Boundary::Closed)),
+            "2" => Some(CellKind::Open(Boundary::Outflow)),
             _ => None,
         })?;
         Ok(Self {
@@ -144,12 +144,12 @@ impl Room {
             let place = grid.place(cell);
             (0..2).any(|axis| place[axis] == 0 || place[axis] + 1 == self.counts[axis])
         };
-        let cells: Vec<Cell> = self
+        let cells: Vec<CellKind> = self
             .cells
             .iter()
             .enumerate()
             .map(|(at, cell)| match cell {
-                Cell::Open(boundary) if !is_on_a_side(at) => Cell::Blocked(*boundary),
+                CellKind::Open(boundary) if !is_on_a_side(at) => CellKind::Blocked(*boundary),
                 other => *other,
             })
             .collect();

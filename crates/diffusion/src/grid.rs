@@ -134,7 +134,7 @@ impl Grid {
     }
 
     /// The cell that holds a point, m. A point on the face between two cells belongs to the upper one. `None` outside the grid.
-    pub fn cell_at(&self, point: [f64; 3]) -> Option<usize> {
+    pub(crate) fn cell_at(&self, point: [f64; 3]) -> Option<usize> {
         let at = [0, 1, 2].map(|axis| self.along(axis, point[axis]));
         Some(self.index([at[0]?, at[1]?, at[2]?]))
     }

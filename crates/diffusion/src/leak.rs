@@ -14,13 +14,13 @@ use std::sync::Arc;
 /// estimated from them to first order; words have errors of their own. The lasting relative error of each sensor ([`LeakPrior::model_error`]) is integrated out.
 ///
 /// ```
-/// use fewbits_diffusion::{Flow, LeakBelief, LeakPrior, Plan, Reading, Scheme, SensorField, StepControl, Transport};
+/// use fewbits_diffusion::{Flow, LeakBelief, LeakPrior, Plan, Reading, FluxRule, SensorField, StepControl, Transport};
 ///
 /// let rows = ["##########", "#kkkk#bbb#", "#kkkk.bbbO", "#kkkk#bbb#", "##########", "k = kitchen", "b = bath"];
 /// let plan = Plan::parse(&rows.join("\n"))?;
 /// let domain = plan.domain(0.5, 2, 0.0)?;
 /// let still = Flow::still(&domain);
-/// let transport = Transport::new(domain, 0.02, &still, 0.0, Scheme::default())?;
+/// let transport = Transport::new(domain, 0.02, &still, 0.0, FluxRule::default())?;
 /// let sensors = [[0.7, 0.7, 0.0], [2.2, 1.7, 0.0], [4.2, 0.8, 0.0]];
 /// let ages = [30.0, 60.0, 120.0, 240.0, 480.0, 960.0];
 /// let field = SensorField::transient(&transport, &sensors, &ages, StepControl::Tolerance(1e-3))?;

@@ -12,7 +12,7 @@
 //! | which cells are air, and the boundary conditions | [`Plan`] (text), [`Domain`] |
 //! | the wind: potential flow, a function, measured velocities | [`PotentialFlow`], [`Flow`] |
 //! | a room, its wind and its concentrations from files of the simulator GADEN | [`gaden::Room`], [`gaden::Table`] |
-//! | diffusivity, decay, the matrix, and where the substance goes | [`Transport`], [`Budget`] |
+//! | diffusivity, decay, the matrix, and where the substance goes | [`Transport`], [`Balance`] |
 //! | the concentration that sources cause: steady, in time | [`Steady::concentration`], [`Transient::run`] |
 //! | what a sensor measures of a source **anywhere** | [`SensorField`], [`Steady::adjoint`], [`Transient::step_responses`] |
 //! | where a leak is, in which room, since when, from readings of a few bits | [`LeakBelief`] |
@@ -21,12 +21,12 @@
 //! cells. One solution with the transposed matrix per sensor gives it for all cells at once, with one factorisation for all sensors.
 //!
 //! ```
-//! use fewbits_diffusion::{PotentialFlow, Plan, Scheme, Source, Steady, Transport};
+//! use fewbits_diffusion::{PotentialFlow, Plan, FluxRule, Source, Steady, Transport};
 //! let plan = Plan::parse("############\n#.....#....#\n#.....#....O\nI..........O\n############")?;
 //! let domain = plan.domain(0.5, 4, 0.0)?;
 //! let wind = PotentialFlow::new(&domain, 0.1)?.flow;
 //! let (leak, sensor) = (domain.point([1.2, 0.8, 0.0])?, domain.point([4.8, 1.3, 0.0])?);
-//! let transport = Transport::new(domain, 0.05, &wind, 0.0, Scheme::default())?;
+//! let transport = Transport::new(domain, 0.05, &wind, 0.0, FluxRule::default())?;
 //! let steady = Steady::new(&transport)?;
 //! let forward = steady.concentration(&[Source { patch: leak.clone(), rate: 1e-6 }])?;
 //! // One adjoint solution says what the sensor measures of a source in any cell.
@@ -36,7 +36,7 @@
 //! ```
 //!
 //! Accuracy, with cell width `h`: in boxes, ducts and slabs the error falls as `h^2`. At corners of walls, where the solution is
-//! singular, it falls as `h^(4/3)`. With [`Scheme::Upwind`], at the ends of openings within a flat wall, and for staircases it falls as
+//! singular, it falls as `h^(4/3)`. With [`FluxRule::Upwind`], at the ends of openings within a flat wall, and for staircases it falls as
 //! `h`. To estimate it, solve with two widths.
 //!
 //! The feature `assembly`, which is on by default, multiplies dense blocks of the factorisations by kernels in assembly, which are 1.9 MB of
@@ -62,7 +62,7 @@ mod transient;
 mod transport;
 mod wind;
 
-pub use domain::{Boundary, Cell, Domain, Patch};
+pub use domain::{Boundary, CellKind, Domain, Patch};
 pub use error::Error;
 pub use field::SensorField;
 pub use flow::Flow;
@@ -71,6 +71,6 @@ pub use leak::LeakBelief;
 pub use leak_prior::{LeakPrior, Reading};
 pub use plan::Plan;
 pub use steady::{Source, Steady};
-pub use transient::{Method, Release, Snapshot, StepControl, Transient};
-pub use transport::{Budget, PerCell, Scheme, Transport};
+pub use transient::{Method, Snapshot, StepControl, TimedSource, Transient};
+pub use transport::{Balance, FluxRule, PerCell, Transport};
 pub use wind::{Divergence, PotentialFlow};

@@ -1,6 +1,6 @@
 //! Floor plans as text.
 
-use crate::{Boundary, Cell, Domain, Error, Grid};
+use crate::{Boundary, CellKind, Domain, Error, Grid};
 use fewbits_numerics::error::{at_least_one, positive, refuse};
 
 /// A floor plan as text: one character per square.
@@ -141,15 +141,15 @@ impl Plan {
         let cell = |cell: usize| {
             let [column, line, _] = grid.place(cell);
             match self.lines[line / split][column / split] {
-                '#' => Cell::Blocked(Boundary::Closed),
-                'L' => Cell::Blocked(Boundary::Leaking(leak)),
-                'A' => Cell::Blocked(Boundary::Absorbing),
-                'I' => Cell::Open(Boundary::Inflow),
-                'O' => Cell::Open(Boundary::Outflow),
-                _ => Cell::Free,
+                '#' => CellKind::Blocked(Boundary::Closed),
+                'L' => CellKind::Blocked(Boundary::Leaking(leak)),
+                'A' => CellKind::Blocked(Boundary::Absorbing),
+                'I' => CellKind::Open(Boundary::Inflow),
+                'O' => CellKind::Open(Boundary::Outflow),
+                _ => CellKind::Free,
             }
         };
-        let cells: Vec<Cell> = (0..grid.cells()).map(cell).collect();
+        let cells: Vec<CellKind> = (0..grid.cells()).map(cell).collect();
         Domain::new(grid, &cells, [[Boundary::Closed; 2]; 3])
     }
 }

@@ -26,7 +26,7 @@ impl Default for StepControl {
 
 /// A release from `start` to `stop`, s. `stop` may be infinite.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Release {
+pub struct TimedSource {
     /// Where it releases.
     pub patch: Patch,
     /// Its rate, kg/s.
@@ -44,7 +44,7 @@ pub struct Snapshot {
     pub time: f64,
     /// Concentration in each free cell, kg/m^3.
     pub concentration: Vec<f64>,
-    /// Integral of the concentration over time since 0, kg s/m^3. [`Transport::budget`] of it says how much has left, and how.
+    /// Integral of the concentration over time since 0, kg s/m^3. [`Transport::balance`] of it says how much has left, and how.
     pub dose: Vec<f64>,
     /// The lowest concentration so far. It is negative only by errors of the time steps.
     pub lowest: f64,
@@ -106,13 +106,13 @@ impl<'a> Transient<'a> {
     /// # Errors
     /// If `initial` has not one number for each free cell, instants do not increase from above 0, a rate is not finite, a release stops
     /// before it starts or starts before 0, a patch is of another domain, a concentration is not, [`Error::Factorisation`] or [`Error::StepTooSmall`].
-    pub fn run(&mut self, initial: &[f64], releases: &[Release], times: &[f64]) -> Result<Vec<Snapshot>, Error> {
+    pub fn run(&mut self, initial: &[f64], releases: &[TimedSource], times: &[f64]) -> Result<Vec<Snapshot>, Error> {
         let transport = self.stepper.transport;
         transport.check_field("initial", initial)?;
         check_instants("times", times)?;
         let last = times.last().copied().unwrap_or(0.0);
         let mut instants = times.to_vec();
-        for Release {
+        for TimedSource {
             patch,
             rate,
             start,

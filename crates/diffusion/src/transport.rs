@@ -10,7 +10,7 @@ use std::sync::{Arc, OnceLock};
 
 /// How the flux through a face depends on the concentrations beside it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Scheme {
+pub enum FluxRule {
     /// The flux of the exact solution in one dimension between the two centres. Second order while the Peclet number `v h / D` of a
     /// cell is below about 3.
     #[default]
@@ -31,7 +31,7 @@ fn bernoulli(x: f64) -> f64 {
     if x < 0.0 { positive + size } else { positive }
 }
 
-impl Scheme {
+impl FluxRule {
     /// Coefficients of the concentrations below and above a face in the upward flux. The Peclet number `p` is positive for upward flow.
     fn weights(self, p: f64) -> [f64; 2] {
         match self {
@@ -83,7 +83,7 @@ pub struct Transport {
 
 /// Where a substance goes: amounts per second of a concentration, or amounts of a dose.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Budget {
+pub struct Balance {
     /// Integral of the field, kg (kg s for a dose).
     pub mass: f64,
     /// Amount that decays.
@@ -98,7 +98,7 @@ pub struct Budget {
     pub outflow: f64,
 }
 
-impl Budget {
+impl Balance {
     /// Sum of all that leaves or decays.
     pub fn removed(&self) -> f64 {
         self.decayed + self.absorbed + self.leaked + self.inflow + self.outflow
@@ -116,7 +116,7 @@ impl Transport {
         diffusivity: impl Into<PerCell>,
         flow: &Flow,
         decay: impl Into<PerCell>,
-        scheme: Scheme,
+        scheme: FluxRule,
     ) -> Result<Self, Error> {
         let domain = domain.into();
         flow.check(&domain)?;
@@ -236,26 +236,26 @@ impl Transport {
     ///
     /// # Errors
     /// If there is not one number per free cell, or mass or the sum of what leaves overflows.
-    pub fn budget(&self, concentration: &[f64]) -> Result<Budget, Error> {
+    pub fn balance(&self, concentration: &[f64]) -> Result<Balance, Error> {
         self.check_field("concentration", concentration)?;
         let contents = || self.volumes.iter().zip(concentration).map(|(volume, c)| volume * c);
-        let mut budget = Budget {
+        let mut balance = Balance {
             mass: contents().sum(),
             decayed: contents().zip(&self.decay).map(|(amount, decay)| amount * decay).sum(),
-            ..Budget::default()
+            ..Balance::default()
         };
         for (face, rate) in self.edge() {
             let part = match face.boundary {
                 None | Some(Boundary::Closed) => continue,
-                Some(Boundary::Absorbing) => &mut budget.absorbed,
-                Some(Boundary::Leaking(_)) => &mut budget.leaked,
-                Some(Boundary::Inflow) => &mut budget.inflow,
-                Some(Boundary::Outflow) => &mut budget.outflow,
+                Some(Boundary::Absorbing) => &mut balance.absorbed,
+                Some(Boundary::Leaking(_)) => &mut balance.leaked,
+                Some(Boundary::Inflow) => &mut balance.inflow,
+                Some(Boundary::Outflow) => &mut balance.outflow,
             };
             *part += rate[face.side()] * concentration[face.cell()];
         }
-        all_finite("budget", &[budget.mass, budget.removed()])?;
-        Ok(budget)
+        all_finite("balance", &[balance.mass, balance.removed()])?;
+        Ok(balance)
     }
 
     /// Checks that a field has one finite number per free cell.

@@ -3,7 +3,7 @@
 use crate::domain::{Face, OUTSIDE};
 use crate::flow::MAX_DIVERGENCE;
 use crate::solver::Direction;
-use crate::{Boundary, Domain, Error, Flow, Scheme, Transport};
+use crate::{Boundary, Domain, Error, Flow, FluxRule, Transport};
 use faer::Mat;
 use fewbits_numerics::error::{positive, within};
 
@@ -136,7 +136,7 @@ fn solve_potential(domain: &Domain, supply: Vec<f64>) -> Result<Vec<f64>, Error>
     let mut open = domain.clone();
     open.faces.retain(Face::is_open);
     let still = Flow::still(&open);
-    let mut transport = Transport::new(open, 1.0, &still, 0.0, Scheme::default())?;
+    let mut transport = Transport::new(open, 1.0, &still, 0.0, FluxRule::default())?;
     let mut drained = vec![false; domain.free().len() + OUTSIDE];
     let outwards = &transport.domain().faces[domain.inner..];
     outwards.iter().for_each(|face| drained[face.cell()] = true);

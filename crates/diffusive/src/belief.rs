@@ -27,21 +27,15 @@ impl<const D: usize> PartialEq for SentBelief<D> {
     }
 }
 
-/// A belief about the position.
-pub type PositionBelief = SentBelief<2>;
-
-/// A belief about position and rate.
-pub type JointBelief = SentBelief<3>;
-
 /// Prior of an update over cells.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Prior {
     /// A position prior; the likelihood holds all records. Nothing is approximated.
     Exact(Gaussian<2>),
     /// A belief of the position, received from the node before.
-    Position(PositionBelief),
+    Position(SentBelief<2>),
     /// A belief of position and rate, received from the node before, and the range of the rate.
-    WithRate(JointBelief, RateRange),
+    WithRate(SentBelief<3>, RateRange),
 }
 
 impl<const D: usize> SentBelief<D> {
@@ -69,7 +63,7 @@ impl<const D: usize> SentBelief<D> {
     }
 }
 
-impl JointBelief {
+impl SentBelief<3> {
     /// Mean and covariance of the position.
     pub fn position(&self) -> Gaussian<2> {
         let both = self.gaussian();
@@ -81,9 +75,9 @@ impl JointBelief {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Travelling {
     /// A belief about the position.
-    Position(PositionBelief),
+    Position(SentBelief<2>),
     /// A belief about position and rate.
-    WithRate(JointBelief),
+    WithRate(SentBelief<3>),
 }
 
 impl Travelling {

@@ -84,7 +84,7 @@ mod sensor;
 mod target;
 mod walk;
 
-pub use belief::{JointBelief, PositionBelief, Prior, SentBelief, Travelling};
+pub use belief::{Prior, SentBelief, Travelling};
 pub use chain::{Action, Next, Outcome, Search, SearchField, SearchState, Status, Step};
 pub use envelope::Envelope;
 pub use fewbits_core::Error;

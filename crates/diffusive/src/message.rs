@@ -203,7 +203,7 @@ impl Message for Packet {
     fn encode(&self, format: &Contract, writer: &mut BitWriter) -> Result<(), CodecError> {
         match self {
             Self::Raw(records) => {
-                writer.write_bit(false);
+                writer.write(0, 1)?;
                 writer.write(records.len() as u64, RECORD_COUNT_BITS)?;
                 let code = format.wire.sample_format(format.noise).map_err(invalid)?;
                 for (node, samples) in records {
@@ -214,7 +214,7 @@ impl Message for Packet {
                 }
             }
             Self::Belief(belief) => {
-                writer.write_bit(true);
+                writer.write(1, 1)?;
                 encode_content(&belief.content, &format.wire.numbers, writer)?;
                 NumberFormat::Single.write(belief.chi_squared, writer)?;
                 writer.write(belief.samples as u64, SAMPLE_COUNT_BITS)?;
@@ -224,7 +224,7 @@ impl Message for Packet {
     }
 
     fn decode(format: &Contract, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
-        if !reader.read_bit()? {
+        if reader.read(1)? == 0 {
             let count = reader.read(RECORD_COUNT_BITS)? as usize;
             let code = format.wire.sample_format(format.noise).map_err(invalid)?;
             let mut records = Vec::new();
@@ -276,7 +276,7 @@ fn encode_content(content: &Content, format: &NumberFormat, writer: &mut BitWrit
     };
     writer.write(components as u64, COUNT_BITS)?;
     writer.write(code as u64, COUNT_BITS)?;
-    writer.write_bit(with_rate);
+    with_rate.encode(&(), writer)?;
     match content {
         Content::Position(mixture) => mixture.encode(&(components, *format), writer),
         Content::WithRate(mixture) => mixture.encode(&(components, *format), writer),
@@ -287,7 +287,7 @@ fn encode_content(content: &Content, format: &NumberFormat, writer: &mut BitWrit
 fn decode_content(format: &Contract, reader: &mut BitReader<'_>) -> Result<Content, CodecError> {
     let components = reader.read(COUNT_BITS)? as usize;
     let code = reader.read(COUNT_BITS)? as usize;
-    let with_rate = reader.read_bit()?;
+    let with_rate = bool::decode(&(), reader)?;
     let numbers = format.wire.numbers;
     match (code, format.form) {
         (MAX_COUNT, _) if with_rate => RoundedMixture::decode(&(components, numbers), reader).map(Content::WithRate),

@@ -79,6 +79,7 @@ impl Posterior {
     ///
     /// # Errors
     /// If `count` is zero.
+    #[doc(hidden)]
     pub fn clumps_with_rate(&self, known: f64, count: usize) -> Result<Clumps<3>, Error> {
         let [x, y] = self.cells.columns();
         let fixed;

@@ -1,6 +1,6 @@
 //! Approximation of the exact posterior by the belief that is sent to the next node.
 
-use crate::belief::{JointBelief, PositionBelief, Travelling};
+use crate::belief::{SentBelief, Travelling};
 use crate::form::Form;
 use crate::posterior::Posterior;
 use crate::{Error, RateModel};
@@ -33,9 +33,9 @@ pub fn project(posterior: &Posterior, form: Form, rate: &RateModel) -> Result<Op
 }
 
 fn position(mixture: Mixture<2>) -> Travelling {
-    Travelling::Position(PositionBelief::Mixture(mixture))
+    Travelling::Position(SentBelief::Mixture(mixture))
 }
 
 fn joint(mixture: Mixture<3>) -> Travelling {
-    Travelling::WithRate(JointBelief::Mixture(mixture))
+    Travelling::WithRate(SentBelief::Mixture(mixture))
 }

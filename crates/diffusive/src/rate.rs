@@ -227,12 +227,12 @@ impl RateSums {
 
     /// Expected sum of squared residuals over the noise variance, `C - 2 m B + (m^2 + v) A`, for a rate of mean `m` and variance
     /// `v`.
-    pub fn chi_squared(&self, (mean, variance): (f64, f64)) -> f64 {
+    pub(crate) fn chi_squared(&self, (mean, variance): (f64, f64)) -> f64 {
         (self.energy - mean * (2.0 * self.correlation - mean * self.response) + variance * self.response).max(0.0)
     }
 
     /// Mean and variance of the rate given the position: `N(B/A, 1/A)` truncated to the range.
-    pub fn rate_given_position(&self, range: &RateRange) -> (f64, f64) {
+    pub(crate) fn rate_given_position(&self, range: &RateRange) -> (f64, f64) {
         if self.response * range.high * range.high < SILENT {
             return uniform(range);
         }
@@ -299,5 +299,24 @@ impl Intervals {
         self.place.clear();
         self.from.clear();
         self.to.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{RateRange, RateSums};
+    use fewbits_core::laws::wild;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn rates_given_the_position_are_possible(x in prop::array::uniform7(any::<u64>().prop_map(wild::number))) {
+            let Ok(range) = RateRange::new(x[0], x[1]) else { return Ok(()) };
+            if let Ok(sums) = RateSums::of(&x[2..4], &x[4..6], x[6]) {
+                let (mean, variance) = sums.rate_given_position(&range);
+                prop_assert!((range.low..=range.high).contains(&mean) && variance >= 0.0, "{:?} {:?}: {} {}", sums, range, mean, variance);
+                prop_assert!(!sums.chi_squared((mean, variance)).is_nan());
+            }
+        }
     }
 }

@@ -135,12 +135,12 @@ impl SourceSensor {
     }
 
     /// Height of the sensors, m.
-    pub fn sensor_height(&self) -> f64 {
+    pub(crate) fn sensor_height(&self) -> f64 {
         self.sensor_height
     }
 
     /// Height of the source, m.
-    pub fn source_height(&self) -> f64 {
+    pub(crate) fn source_height(&self) -> f64 {
         self.source_height
     }
 

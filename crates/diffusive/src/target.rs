@@ -1,6 +1,6 @@
 //! The product of a belief and the likelihood of records, evaluated on cells.
 
-use crate::belief::{JointBelief, PositionBelief, Prior};
+use crate::belief::{Prior, SentBelief};
 use crate::density::{CellTarget, Cells};
 use crate::likelihood::SourceLikelihood;
 use crate::rate::{Intervals, RateModel, RateRange, RateSums, cut_normal, ends_about};
@@ -70,7 +70,7 @@ impl<'a> Target<'a> {
         let (mut lobes, mut conditionals) = (Vec::new(), Vec::new());
         match prior {
             Prior::Exact(gaussian) => lobes.push(Lobe::new(1.0, *gaussian.mean(), *gaussian.covariance())),
-            Prior::Position(PositionBelief::Mixture(mixture)) => {
+            Prior::Position(SentBelief::Mixture(mixture)) => {
                 lobes.extend(
                     mixture
                         .components()
@@ -78,8 +78,8 @@ impl<'a> Target<'a> {
                         .map(|c| Lobe::new(c.weight(), *c.mean(), *c.covariance())),
                 );
             }
-            Prior::Position(PositionBelief::Other(_)) | Prior::WithRate(JointBelief::Other(_), _) => {}
-            Prior::WithRate(JointBelief::Mixture(mixture), _) => {
+            Prior::Position(SentBelief::Other(_)) | Prior::WithRate(SentBelief::Other(_), _) => {}
+            Prior::WithRate(SentBelief::Mixture(mixture), _) => {
                 for c in mixture.components() {
                     let s = c.covariance();
                     let position = s.fixed_view::<2, 2>(0, 0).into_owned();
@@ -138,7 +138,7 @@ impl<'a> Target<'a> {
             let at = Vector2::new(*x, *y);
             let sums = self.likelihood.sums(&at);
             let rate = match (self.prior, self.likelihood.rate()) {
-                (Prior::WithRate(JointBelief::Other(density), range), _) => {
+                (Prior::WithRate(SentBelief::Other(density), range), _) => {
                     let sums = [sums.response, sums.correlation, sums.energy];
                     let moments = density.rate(&at, 0.0, sums, [range.low(), range.high()]);
                     (moments.mean, moments.variance)
@@ -239,7 +239,7 @@ impl CellTarget<2> for Target<'_> {
                 let (own, wide) = (&mut own[..count], &mut wide[..count]);
                 for i in 0..count {
                     (own[i], wide[i]) = match self.prior {
-                        Prior::Position(PositionBelief::Other(density)) => {
+                        Prior::Position(SentBelief::Other(density)) => {
                             density.log_density_and_bound(&at(i), half_width, &mut scratch)
                         }
                         _ => log_mixture(&self.lobes, &precisions, &at(i)),
@@ -284,7 +284,7 @@ impl Target<'_> {
     /// Log density and score of a run of cells under a belief over position and rate.
     fn with_rate(
         &self,
-        (belief, range): (&JointBelief, &RateRange),
+        (belief, range): (&SentBelief<3>, &RateRange),
         centres: &[&[f64]; 2],
         half: f64,
         precisions: &[[[f64; 3]; 2]],
@@ -307,8 +307,8 @@ impl Target<'_> {
         }
         let all: Vec<usize> = (0..count).collect();
         let evaluate = |cells: &[usize], which: usize, sums: &[[f64; 3]], out: &mut [f64]| match belief {
-            JointBelief::Mixture(_) => self.log_sums(cells, &at, precisions, (which, sums), range, out),
-            JointBelief::Other(density) => {
+            SentBelief::Mixture(_) => self.log_sums(cells, &at, precisions, (which, sums), range, out),
+            SentBelief::Other(density) => {
                 let (half, range) = (if which == 1 { half } else { 0.0 }, [range.low(), range.high()]);
                 for i in cells {
                     out[*i] = density.rate(&at(*i), half, sums[*i], range).log_mass;

@@ -193,42 +193,26 @@ impl ScalarFilter for DymboFilter {
         let p = predicted.covariance()[0];
         // With the threshold at the prediction both bits have probability 1/2, for any crossover.
         let log_likelihood = -LN_2 + self.link.of_received()?.ln();
-        let report = Report {
+        let info = StepInfo {
+            predicted: *predicted,
             correction: bit.value() * self.gain(p),
-            variance: filtered_variance(p, self.plant.measurement_variance(), self.information()),
             information: self.information(),
             log_likelihood,
             bits: 1,
         };
-        report.correct(predicted)
+        info.corrected(filtered_variance(p, self.plant.measurement_variance(), self.information()))
     }
 }
 
-/// The effect of one received report on the belief.
-pub(crate) struct Report {
-    pub(crate) correction: f64,
-    pub(crate) variance: f64,
-    pub(crate) information: f64,
-    pub(crate) log_likelihood: f64,
-    pub(crate) bits: u32,
-}
-
-impl Report {
-    /// The corrected belief; impossible if a number is not finite.
+impl StepInfo {
+    /// The belief with this correction and variance; impossible if a number is not finite.
     #[inline]
-    pub(crate) fn correct(self, predicted: &Gaussian<1>) -> Result<(Gaussian<1>, StepInfo), Error> {
-        let mean = predicted.mean()[0] + self.correction;
-        if !(mean.is_finite() && self.variance.is_finite() && self.log_likelihood.is_finite()) {
+    pub(crate) fn corrected(self, variance: f64) -> Result<(Gaussian<1>, Self), Error> {
+        let mean = self.predicted.mean()[0] + self.correction;
+        if !(mean.is_finite() && variance.is_finite() && self.log_likelihood.is_finite()) {
             return Err(Error::Impossible);
         }
-        let info = StepInfo {
-            predicted: *predicted,
-            correction: self.correction,
-            log_likelihood: self.log_likelihood,
-            information: self.information,
-            bits: self.bits,
-        };
-        Ok((scalar(mean, self.variance), info))
+        Ok((scalar(mean, variance), self))
     }
 }
 
@@ -238,14 +222,14 @@ pub(crate) fn without_report<R>(
     observation: &Observation<R>,
     link: &Link,
 ) -> Result<(Gaussian<1>, StepInfo), Error> {
-    let report = Report {
+    let info = StepInfo {
+        predicted: *predicted,
         correction: 0.0,
-        variance: predicted.covariance()[0],
         information: 0.0,
         log_likelihood: link.delivery(observation).ln(),
         bits: 0,
     };
-    report.correct(predicted)
+    info.corrected(predicted.covariance()[0])
 }
 
 #[cfg(test)]

@@ -116,27 +116,6 @@ impl InnovationWord {
         self.quantizer
     }
 
-    /// The word for a measurement.
-    ///
-    /// # Errors
-    /// If a number is not finite, or the deviation is not positive.
-    #[inline]
-    pub fn word(&self, measurement: f64, prediction: &Prediction) -> Result<CellIndex, ArgumentError> {
-        let thresholds = self.quantizer.breakpoints();
-        let below = fewbits_node::innovation_cell(thresholds, measurement, prediction.mean, prediction.deviation)?;
-        Ok(CellIndex(below as u16))
-    }
-
-    /// The cell of a word, in measurement units around a prediction.
-    ///
-    /// # Errors
-    /// If the index is beyond the last cell, the prediction is not a valid one, or its mean is so large that the cell's ends coincide.
-    pub fn cell(&self, index: CellIndex, prediction: &Prediction) -> Result<Cell, ArgumentError> {
-        let (edges, at) = (self.centred(prediction)?, self.index(index)?);
-        let lower = if at == 0 { f64::NEG_INFINITY } else { edges[at - 1] };
-        Cell::new(lower, edges.get(at).copied().unwrap_or(f64::INFINITY))
-    }
-
     /// The word as an index into the quantizer's tables; an error beyond the last cell.
     pub(crate) fn index(&self, index: CellIndex) -> Result<usize, ArgumentError> {
         let at = usize::from(index.0);
@@ -175,7 +154,9 @@ impl Quantized for InnovationWord {
 
     #[inline]
     fn report_of(&self, measurement: f64, prediction: &Prediction) -> Result<CellIndex, Error> {
-        Ok(self.word(measurement, prediction)?)
+        let thresholds = self.quantizer.breakpoints();
+        let below = fewbits_node::innovation_cell(thresholds, measurement, prediction.mean, prediction.deviation);
+        Ok(CellIndex(below.map_err(ArgumentError::from)? as u16))
     }
 
     fn edges(&self, prediction: &Prediction) -> Result<Vec<f64>, Error> {
@@ -194,14 +175,18 @@ impl Quantized for InnovationWord {
         self.bits
     }
 
+    /// Fails too if the mean is so large that the cell's ends coincide.
     fn only_cell(&self, index: &CellIndex, prediction: &Prediction) -> Result<Option<Cell>, Error> {
-        Ok(Some(self.cell(*index, prediction)?))
+        let (edges, at) = (self.centred(prediction)?, self.index(*index)?);
+        let lower = if at == 0 { f64::NEG_INFINITY } else { edges[at - 1] };
+        Ok(Some(Cell::new(lower, edges.get(at).copied().unwrap_or(f64::INFINITY))?))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::{CellIndex, InnovationWord, Prediction};
+    use fewbits_core::Quantized;
     use fewbits_core::laws::message::round_trip;
     use proptest::prelude::*;
 
@@ -210,9 +195,9 @@ mod tests {
         fn words_keep_their_length(bits in 1_usize..=8, x in -20.0..20.0_f64, mean in -5.0..5.0_f64, deviation in 0.1..4.0_f64) {
             let scheme = InnovationWord::new(1.0, bits).unwrap();
             let prediction = Prediction { mean, deviation };
-            let word = scheme.word(x, &prediction).unwrap();
+            let word = scheme.report_of(x, &prediction).unwrap();
             prop_assert_eq!(round_trip(&word, &scheme.bits()).unwrap(), bits);
-            let cell = scheme.cell(word, &prediction).unwrap();
+            let cell = scheme.only_cell(&word, &prediction).unwrap().unwrap();
             // Rounding of the two maps may part at an edge.
             prop_assert!(cell.lower() <= x + 1e-12 && x <= cell.upper() + 1e-12);
             let centroid = scheme.quantizer().centroids()[usize::from(word.0)];
@@ -227,9 +212,9 @@ mod tests {
             mean: 1.0,
             deviation: 2.0,
         };
-        assert_eq!(scheme.word(1.0, &prediction), Ok(CellIndex(1)));
-        assert_eq!(scheme.word(0.999, &prediction), Ok(CellIndex(0)));
-        assert!(scheme.cell(CellIndex(2), &prediction).is_err());
+        assert_eq!(scheme.report_of(1.0, &prediction), Ok(CellIndex(1)));
+        assert_eq!(scheme.report_of(0.999, &prediction), Ok(CellIndex(0)));
+        assert!(scheme.only_cell(&CellIndex(2), &prediction).is_err());
         assert!(InnovationWord::new(1.0, 0).is_err() && InnovationWord::new(1.0, 9).is_err());
         let json = serde_json::to_string(&scheme).unwrap();
         assert_eq!(serde_json::from_str::<InnovationWord>(&json).unwrap(), scheme);

@@ -1,6 +1,6 @@
 //! Several bits per sample: the filter for the quantized innovation.
 
-use crate::filter::{Report, ScalarFilter, StepInfo, without_report};
+use crate::filter::{ScalarFilter, StepInfo, without_report};
 use crate::plant::{filtered_variance, innovation_gain};
 use crate::{CellIndex, Error, InnovationWord, Prediction, ScalarPlant};
 use fewbits_core::{Gaussian, Link, Observation};
@@ -148,14 +148,14 @@ impl ScalarFilter for MultibitFilter {
         };
         let (level, probability) = self.levels[self.scheme.index(*word)?];
         let (p, r) = (predicted.covariance()[0], self.plant.measurement_variance());
-        let report = Report {
+        let info = StepInfo {
+            predicted: *predicted,
             correction: innovation_gain(p, r) * level,
-            variance: filtered_variance(p, r, self.information),
             information: self.information,
             log_likelihood: probability.ln() + self.link.arrival().ln(),
             bits: self.scheme.bits(),
         };
-        report.correct(predicted)
+        info.corrected(filtered_variance(p, r, self.information))
     }
 }
 

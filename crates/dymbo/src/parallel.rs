@@ -5,7 +5,7 @@
 //! filter is for sensors that must answer at the same time. They share one prediction error, so their bits are correlated, and the
 //! number of `+1` is a sufficient statistic.
 
-use crate::filter::{Report, StepInfo};
+use crate::filter::StepInfo;
 use crate::plant::{innovation_gain, scalar};
 use crate::{Error, ScalarPlant};
 use fewbits_core::factor::{Levels, Product, Scalar};
@@ -189,14 +189,14 @@ impl ParallelFilter {
         };
         let r = self.plant.measurement_variance();
         let gained = (p - variance) / p * ((p + r) / p);
-        let report = Report {
+        let info = StepInfo {
+            predicted: *predicted,
             correction,
-            variance,
             information: if p > 0.0 { gained } else { 0.0 },
             log_likelihood: log_evidence + missing,
             bits: bits as u32,
         };
-        report.correct(predicted)
+        info.corrected(variance)
     }
 }
 

@@ -1,11 +1,12 @@
 //! Smoothing of particles by backward simulation.
 
 use crate::Error;
-use fewbits_core::GaussianDynamics;
-use fewbits_densities::Particles;
+use fewbits_core::columns::state_at;
+use fewbits_core::{Gaussian, GaussianDynamics};
+use fewbits_densities::{Categorical, Particles};
 use fewbits_numerics::error::{at_least_one, refuse};
 use nalgebra::SVector;
-use rand::{Rng, RngExt};
+use rand::Rng;
 
 /// Paths drawn from the law of all states given all observations, from the filtered particles of each time (Godsill, Doucet and West 2004).
 ///
@@ -33,56 +34,34 @@ pub fn backward_simulation<const D: usize>(
     if dynamics.len() + 1 != filtered.len() {
         return refuse("dynamics", dynamics.len(), format!("{}, one fewer than beliefs", filtered.len() - 1));
     }
-    let mut drawn: Vec<SVector<f64, D>> = Vec::with_capacity(paths);
-    for _ in 0..paths {
-        drawn.push(picked(rng, last, last.weights())?);
-    }
+    let last_weights = Categorical::new(last.weights());
+    let mut drawn: Vec<_> = (0..paths)
+        .map(|_| state_at(&last.columns(), last_weights.draw(rng)))
+        .collect();
     let mut found = vec![equal(&drawn)?];
-    let mut weights = Vec::new();
     for (dynamics, belief) in dynamics.iter().zip(filtered).rev() {
-        let mut from = Vec::with_capacity(belief.len());
-        for i in 0..belief.len() {
-            let Some(state) = belief.point(i) else { continue };
-            let Some(factor) = dynamics.noise_covariance_at(&state).cholesky() else {
+        let (columns, mut from) = (belief.columns(), Vec::with_capacity(belief.len()));
+        for (i, log) in belief.log_weights().iter().enumerate() {
+            let state = state_at(&columns, i);
+            let law = Gaussian::from_trusted_parts(dynamics.mean(&state), dynamics.noise_covariance_at(&state));
+            let Ok(law) = law.factored() else {
                 return refuse("noise covariance", "singular", "a covariance of full rank in every step");
             };
-            let log_determinant: f64 = factor.l_dirty().diagonal().iter().map(|root| root.ln()).sum();
-            from.push((dynamics.mean(&state), factor, belief.log_weights()[i] - log_determinant));
+            from.push((law, *log));
         }
         for state in &mut drawn {
-            weights.clear();
-            let mut highest = f64::NEG_INFINITY;
-            for (mean, factor, log) in &from {
-                let off = *state - mean;
-                let log = log - 0.5 * off.dot(&factor.solve(&off));
-                highest = highest.max(log);
-                weights.push(log);
-            }
+            let mut logs: Vec<f64> = from.iter().map(|(law, log)| log + law.log_pdf(state)).collect();
+            let highest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             if !highest.is_finite() {
                 return Err(Error::Impossible);
             }
-            weights.iter_mut().for_each(|log| *log = (*log - highest).exp());
-            *state = picked(rng, belief, &weights)?;
+            logs.iter_mut().for_each(|log| *log = (*log - highest).exp());
+            *state = state_at(&columns, Categorical::new(&logs).draw(rng));
         }
         found.push(equal(&drawn)?);
     }
     found.reverse();
     Ok(found)
-}
-
-/// One particle with a probability proportional to its weight.
-fn picked<const D: usize>(rng: &mut dyn Rng, belief: &Particles<D>, weights: &[f64]) -> Result<SVector<f64, D>, Error> {
-    let total: f64 = weights.iter().sum();
-    let mut left = rng.random::<f64>() * total;
-    let mut chosen = None;
-    for (i, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-        chosen = Some(i);
-        left -= weight;
-        if left < 0.0 {
-            break;
-        }
-    }
-    chosen.and_then(|i| belief.point(i)).ok_or(Error::Impossible)
 }
 
 fn equal<const D: usize>(states: &[SVector<f64, D>]) -> Result<Particles<D>, Error> {

@@ -7,18 +7,6 @@ use crate::Error;
 use fewbits_core::{Belief, Gaussian, GaussianDynamics, Likelihood};
 use rand::Rng;
 
-/// Conditions a Gaussian on observations, one after the other: the posterior, and `ln p(all observations)` by the chain rule.
-pub(crate) fn condition_all<const D: usize>(
-    belief: &Gaussian<D>,
-    observed: &[&dyn Likelihood<D>],
-) -> Result<(Gaussian<D>, f64), Error> {
-    let (mut next, mut log_likelihood) = (*belief, 0.0);
-    for one in observed {
-        log_likelihood += one.condition(&mut next)?.log_likelihood;
-    }
-    Ok((next, log_likelihood))
-}
-
 /// Results of an update other than the new belief.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
@@ -160,9 +148,7 @@ impl<const D: usize> StateFilter<D> for MomentFilter {
         belief: &mut Gaussian<D>,
         observed: &[&dyn Likelihood<D>],
     ) -> Result<Info, Error> {
-        let (next, log_likelihood) = condition_all(belief, observed)?;
-        *belief = next;
-        Ok(Info::new(log_likelihood))
+        Ok(Info::new(observed.condition(belief)?.log_likelihood))
     }
 
     fn of_moments(&self, moments: &Gaussian<D>) -> Option<Gaussian<D>> {

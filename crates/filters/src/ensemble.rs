@@ -87,12 +87,10 @@ impl<const D: usize> StateFilter<D> for EnsembleFilter {
         belief: &mut Particles<D>,
         observed: &[&dyn Likelihood<D>],
     ) -> Result<Info, Error> {
-        let mut next = belief.clone();
-        let mut log_likelihood = 0.0;
-        for one in observed {
-            log_likelihood += one.move_points(next.columns_mut(), &self.weights)?.log_likelihood;
-        }
-        *belief = next;
-        Ok(Info::new(log_likelihood))
+        Ok(Info::new(
+            observed
+                .move_points(belief.columns_mut(), &self.weights)?
+                .log_likelihood,
+        ))
     }
 }

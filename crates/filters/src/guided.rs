@@ -1,6 +1,6 @@
 //! A particle filter whose proposal depends on the observations.
 
-use crate::contract::{Info, StateFilter, condition_all};
+use crate::contract::{Info, StateFilter};
 use crate::particle::{BootstrapFilter, weigh};
 use crate::{Error, ResamplingRule};
 use fewbits_core::columns::{set_state, state_at};
@@ -114,7 +114,8 @@ fn propose<const D: usize>(
     moved: &Gaussian<D>,
     observed: &[&dyn Likelihood<D>],
 ) -> Option<(SVector<f64, D>, f64)> {
-    let (posterior, _) = condition_all(moved, observed).ok()?;
+    let mut posterior = *moved;
+    observed.condition(&mut posterior).ok()?;
     // u = back (x' - f) on the range of Q; elsewhere u stays standard normal.
     let lower = semidefinite_factor("noise_covariance", moved.covariance()).ok()?;
     let back = solve_semidefinite(moved.covariance(), &lower).ok()?.transpose();

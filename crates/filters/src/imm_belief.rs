@@ -3,7 +3,7 @@
 use crate::Error;
 use fewbits_core::columns::change_each;
 use fewbits_core::{Belief, ColumnsMut, Gaussian};
-use fewbits_densities::Categorical;
+use fewbits_densities::{Categorical, moment_matched};
 use fewbits_numerics::error::{ArgumentError, at_least_one, probabilities};
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
@@ -79,14 +79,9 @@ impl<const D: usize> ImmBelief<D> {
     }
 }
 
-/// Mean and covariance of a mixture whose weights sum to one. The covariance of the means is computed as a sum of squares.
+/// The Gaussian with the moments of a mixture whose weights sum to one.
 pub(crate) fn moments<'a, const D: usize>(parts: impl Iterator<Item = (f64, &'a Gaussian<D>)> + Clone) -> Gaussian<D> {
-    let mean = parts.clone().fold(SVector::zeros(), |sum, (w, g)| sum + g.mean() * w);
-    let covariance = parts.fold(SMatrix::zeros(), |sum, (w, g)| {
-        let d = g.mean() - mean;
-        sum + (g.covariance() + d * d.transpose()) * w
-    });
-    Gaussian::from_trusted_parts(mean, covariance)
+    moment_matched(parts.map(|(weight, part)| (weight, *part.mean(), *part.covariance())))
 }
 
 /// The models' beliefs may be so far apart that the covariance of all together overflows.

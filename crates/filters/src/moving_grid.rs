@@ -94,10 +94,7 @@ impl Masses {
         let count = ((self.masses.len() - 1) as f64 * ratio).ceil() as usize + 2;
         let mut masses = vec![0.0; count];
         for (i, mass) in self.masses.iter().enumerate() {
-            let place = i as f64 * ratio;
-            let below = place.floor();
-            masses[below as usize] += mass * (1.0 - (place - below));
-            masses[below as usize + 1] += mass * (place - below);
+            share_out(&mut masses, i as f64 * ratio, *mass);
         }
         Self {
             first: self.first,
@@ -156,6 +153,13 @@ impl Masses {
     }
 }
 
+/// Shares a mass at a place, counted in nodes, between the two nodes beside it, so that the mean stays.
+fn share_out(masses: &mut [f64], place: f64, mass: f64) {
+    let below = place.floor();
+    masses[below as usize] += mass * (1.0 - (place - below));
+    masses[below as usize + 1] += mass * (place - below);
+}
+
 /// The mixture of two beliefs, of which the first has this share. Its grid has the distance of the finer of the two, unless that takes too
 /// many nodes.
 pub(crate) fn mixed(one: &PointMass, other: &PointMass, share: f64) -> Result<PointMass, Error> {
@@ -169,12 +173,8 @@ pub(crate) fn mixed(one: &PointMass, other: &PointMass, share: f64) -> Result<Po
     for (belief, share) in both {
         let (grid, density) = (belief.grid(), belief.density());
         if grid.spacing() < spacing {
-            // Each mass is shared by the two nodes beside it.
             for (i, density) in density.iter().enumerate() {
-                let place = (grid.node(i) - first) / spacing;
-                let (below, mass) = (place.floor(), share * density * grid.spacing());
-                masses[below as usize] += mass * (1.0 - (place - below));
-                masses[below as usize + 1] += mass * (place - below);
+                share_out(&mut masses, (grid.node(i) - first) / spacing, share * density * grid.spacing());
             }
         } else {
             // The density between nodes is a line from each to the next.

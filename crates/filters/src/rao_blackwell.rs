@@ -7,7 +7,7 @@ use fewbits_core::columns::{change_each, count, set_state, state_at};
 use fewbits_core::factor::Scalar;
 use fewbits_core::value_update;
 use fewbits_core::{Cell, FactoredGaussian, Gaussian, GaussianDynamics, Likelihood, LinearScalar};
-use fewbits_densities::GaussianCloud;
+use fewbits_densities::{GaussianCloud, systematic};
 use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::{LogSum, normal};
 use nalgebra::{SMatrix, SVector};
@@ -134,17 +134,8 @@ impl<const D: usize> StateFilter<D> for RaoBlackwellised<D> {
         if logs.len() <= MAX_TESTED {
             return Some((0..logs.len()).map(|i| (logs[i], of(i))).collect());
         }
-        let highest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let weights: Vec<f64> = logs.iter().map(|log| (log - highest).exp()).collect();
-        let step = weights.iter().sum::<f64>() / MAX_TESTED as f64;
-        let (mut picked, mut sum) = (Vec::with_capacity(MAX_TESTED), 0.0);
-        for (i, weight) in weights.iter().enumerate() {
-            sum += weight;
-            while (picked.len() as f64 + 0.5) * step < sum && picked.len() < MAX_TESTED {
-                picked.push((0.0, of(i)));
-            }
-        }
-        Some(picked)
+        let picked = systematic(means.weights(), MAX_TESTED, 0.5).into_iter();
+        Some(picked.map(|i| (0.0, of(i))).collect())
     }
 }
 

@@ -25,50 +25,50 @@ use nalgebra::SMatrix;
 /// ```
 ///
 /// # Errors
-/// If a covariance is not symmetric positive semidefinite.
+/// If a covariance is not symmetric positive semidefinite; [`Error::NotANumber`] if a moment of the result is not finite.
 pub fn smooth_step<const D: usize>(
     dynamics: &impl LinearDynamics<D>,
     filtered: &Gaussian<D>,
     smoothed_next: &Gaussian<D>,
 ) -> Result<Gaussian<D>, Error> {
-    let transition = dynamics.transition();
     let predicted = kalman::predict(dynamics, filtered);
-    let gain = solve_semidefinite(predicted.covariance(), &(transition * filtered.covariance()))?.transpose();
-    // A sum of positive semidefinite terms, equal to M + C (next P - P+) C', in which nothing cancels.
-    let keep = SMatrix::<f64, D, D>::identity() - gain * transition;
-    let future = smoothed_next.covariance() + dynamics.noise_covariance();
-    Ok(Gaussian::from_trusted_parts(
-        filtered.mean() + gain * (smoothed_next.mean() - predicted.mean()),
-        keep * filtered.covariance() * keep.transpose() + gain * future * gain.transpose(),
-    ))
+    back(dynamics.transition(), dynamics.noise_covariance(), &predicted, filtered, smoothed_next)
 }
 
 /// The same along any dynamics with Gaussian noise: [`smooth_step`] with the dynamics linearised at the filtered mean, exact if they are linear.
-///
-/// # Errors
-/// If a covariance is not positive semidefinite, or a moment of the result not finite.
 pub(crate) fn smooth_along<const D: usize>(
     dynamics: &dyn GaussianDynamics<D>,
     filtered: &Gaussian<D>,
     smoothed_next: &Gaussian<D>,
 ) -> Result<Gaussian<D>, Error> {
-    let (mean, covariance) = (filtered.mean(), filtered.covariance());
-    let transition: SMatrix<f64, D, D> = dynamics.jacobian(mean);
-    let noise = dynamics.noise_covariance_at(mean);
-    let predicted = transition * covariance * transition.transpose() + noise;
-    let predicted = (predicted + predicted.transpose()) * 0.5;
-    let gain = solve_semidefinite(&predicted, &(transition * covariance))?.transpose();
-    // A sum of positive semidefinite terms, in which nothing cancels.
+    let mean = filtered.mean();
+    let (transition, noise) = (dynamics.jacobian(mean), dynamics.noise_covariance_at(mean));
+    let covariance = transition * filtered.covariance() * transition.transpose() + noise;
+    let predicted = Gaussian::from_trusted_parts(dynamics.mean(mean), covariance);
+    back(&transition, &noise, &predicted, filtered, smoothed_next)
+}
+
+fn back<const D: usize>(
+    transition: &SMatrix<f64, D, D>,
+    noise: &SMatrix<f64, D, D>,
+    predicted: &Gaussian<D>,
+    filtered: &Gaussian<D>,
+    smoothed_next: &Gaussian<D>,
+) -> Result<Gaussian<D>, Error> {
+    let gain = solve_semidefinite(predicted.covariance(), &(transition * filtered.covariance()))?.transpose();
+    // A sum of positive semidefinite terms, equal to M + C (next P - P+) C', in which nothing cancels.
     let keep = SMatrix::<f64, D, D>::identity() - gain * transition;
     let future = smoothed_next.covariance() + noise;
-    let found = keep * covariance * keep.transpose() + gain * future * gain.transpose();
-    let next = mean + gain * (smoothed_next.mean() - dynamics.mean(mean));
-    if !next.iter().chain(found.iter()).all(|number| number.is_finite()) {
-        return Err(Error::NotANumber {
-            what: "a smoothed moment",
-        });
+    let found = Gaussian::from_trusted_parts(
+        filtered.mean() + gain * (smoothed_next.mean() - predicted.mean()),
+        keep * filtered.covariance() * keep.transpose() + gain * future * gain.transpose(),
+    );
+    let what = "a smoothed moment";
+    if found.is_finite() {
+        Ok(found)
+    } else {
+        Err(Error::NotANumber { what })
     }
-    Ok(Gaussian::from_trusted_parts(next, (found + found.transpose()) * 0.5))
 }
 
 #[cfg(test)]

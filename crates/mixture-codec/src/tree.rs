@@ -248,7 +248,7 @@ impl<const D: usize> Tree<D> {
     ///
     /// # Errors
     /// If this is not so.
-    pub fn check_cut(&self, cut: &[usize]) -> Result<(), Error> {
+    pub(crate) fn check_cut(&self, cut: &[usize]) -> Result<(), Error> {
         let mut ranges: Vec<Range<usize>> = Vec::with_capacity(cut.len());
         for index in cut {
             match self.nodes.get(*index) {

@@ -216,7 +216,11 @@ impl<const D: usize> ContinuousLinear<D> {
         if !(transition.iter().all(sound) && offset.iter().all(sound) && noise.iter().all(sound)) {
             return Err(ArgumentError::new("seconds", seconds, "a time over which the state stays a number"));
         }
-        Ok(AffineGaussian::from_checked(transition, offset, symmetrised(&noise)))
+        Ok(AffineGaussian {
+            transition,
+            offset,
+            noise_covariance: symmetrised(&noise),
+        })
     }
 }
 
@@ -241,19 +245,11 @@ impl<const D: usize> AffineGaussian<D> {
         all_finite("transition", transition.as_slice())?;
         all_finite("offset", offset.as_slice())?;
         semidefinite_factor("noise_covariance", &noise_covariance)?;
-        Ok(Self::from_checked(transition, offset, symmetrised(&noise_covariance)))
-    }
-
-    fn from_checked(
-        transition: SMatrix<f64, D, D>,
-        offset: SVector<f64, D>,
-        noise_covariance: SMatrix<f64, D, D>,
-    ) -> Self {
-        Self {
+        Ok(Self {
             transition,
             offset,
-            noise_covariance,
-        }
+            noise_covariance: symmetrised(&noise_covariance),
+        })
     }
 
     /// Transition `F`.

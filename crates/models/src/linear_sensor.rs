@@ -69,11 +69,6 @@ impl<const D: usize, const M: usize> LinearSensor<D, M> {
     pub fn noise_covariance(&self) -> &SMatrix<f64, M, M> {
         &self.noise_covariance
     }
-
-    /// The lower Cholesky factor of `R`.
-    pub fn noise_factor(&self) -> &SMatrix<f64, M, M> {
-        &self.noise_factor
-    }
 }
 
 impl<const D: usize> ScalarSensor<D> {
@@ -167,7 +162,7 @@ mod tests {
         let sensor = ScalarSensor::scalar(Vector2::new(2.0, -1.0), 0.25).unwrap();
         assert_eq!(sensor.mean(&Vector2::new(3.0, 1.0))[0], 5.0);
         assert_eq!((sensor.direction(), sensor.noise_variance()), (Vector2::new(2.0, -1.0), 0.25));
-        assert_eq!(sensor.noise_factor()[0], 0.5);
+        assert_eq!(sensor.noise_factor[0], 0.5);
     }
 
     #[test]

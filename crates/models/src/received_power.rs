@@ -116,7 +116,7 @@ impl<const D: usize> ReceivedPower<D> {
     }
 
     /// Noise-free amplitude of a source at `(x, y)`.
-    pub fn amplitude_at(&self, x: f64, y: f64) -> f64 {
+    fn amplitude_at(&self, x: f64, y: f64) -> f64 {
         let (dx, dy) = (x - self.position[0], y - self.position[1]);
         self.amplitude(dx * dx + dy * dy)
     }
@@ -125,7 +125,7 @@ impl<const D: usize> ReceivedPower<D> {
     /// `c = -(1/2) sqrt(P0) alpha n d^(n-2) (1 + alpha d^n)^(-3/2)`.
     ///
     /// At the sensor itself the gradient is zero for `n > 1`. For `n = 1` it has no limit there, and zero is returned.
-    pub fn slope_at(&self, x: f64, y: f64) -> Vector2<f64> {
+    fn slope_at(&self, x: f64, y: f64) -> Vector2<f64> {
         let offset = Vector2::new(x, y) - self.position;
         let distance = offset[0].hypot(offset[1]);
         // If the squared distance overflows, the slope is zero.

@@ -2,6 +2,7 @@
 
 use crate::association::{Weights, marginals};
 use fewbits_core::{Error, Gaussian, GaussianDynamics, Likelihood};
+use fewbits_densities::moment_matched;
 use fewbits_numerics::error::{non_negative, within};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
@@ -227,7 +228,8 @@ impl<const D: usize> Tracker<D> {
             if existence < self.least || existence == 0.0 {
                 continue;
             }
-            let belief = moments(parts, existence);
+            let belief =
+                moment_matched(parts().map(|(share, part)| (share / existence, *part.mean(), *part.covariance())));
             if !belief.is_finite() {
                 return Err(Error::NotANumber {
                     what: "an updated track",
@@ -242,17 +244,4 @@ impl<const D: usize> Tracker<D> {
         tracks.list = list;
         Ok(shares.log_evidence)
     }
-}
-
-/// Mean and covariance of a mixture whose weights sum to `total`.
-fn moments<'a, const D: usize, I: Iterator<Item = (f64, &'a Gaussian<D>)>>(
-    parts: impl Fn() -> I,
-    total: f64,
-) -> Gaussian<D> {
-    let mean: SVector<f64, D> = parts().map(|(share, part)| part.mean() * (share / total)).sum();
-    let spread = |(share, part): (f64, &Gaussian<D>)| {
-        let off = part.mean() - mean;
-        (part.covariance() + off * off.transpose()) * (share / total)
-    };
-    Gaussian::from_trusted_parts(mean, parts().map(spread).sum())
 }

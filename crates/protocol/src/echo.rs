@@ -18,7 +18,7 @@ pub enum ReportLength {
 
 impl ReportLength {
     /// Whether a report may have this many bits.
-    pub fn allows(self, bits: usize) -> bool {
+    pub(crate) fn allows(self, bits: usize) -> bool {
         match self {
             Self::Fixed(expected) => bits == expected as usize,
             Self::Varying => bits < 1 << LENGTH_BITS,
@@ -61,10 +61,10 @@ pub fn reports_of(
     let mut observed = Vec::with_capacity(lengths.len());
     for length in lengths {
         // Prefix code: 0 nothing arrived, 11 and a report, 100 known to be lost, 101 no observation.
-        observed.push(if !reader.read_bit()? {
+        observed.push(if reader.read(1)? == 0 {
             Some(Observation::Nothing)
-        } else if !reader.read_bit()? {
-            (!reader.read_bit()?).then_some(Observation::Lost)
+        } else if reader.read(1)? == 0 {
+            (reader.read(1)? == 0).then_some(Observation::Lost)
         } else {
             let bits = match length {
                 ReportLength::Fixed(bits) => *bits as usize,

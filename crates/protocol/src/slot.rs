@@ -101,8 +101,26 @@ impl Schedule {
     }
 
     /// Sets the schedule so that slot `slot` begins at `now`.
-    pub fn synchronise(&mut self, slot: Slot, now: u64) {
+    pub(crate) fn synchronise(&mut self, slot: Slot, now: u64) {
         let count = slot.nearest_count(self.count(now));
         self.origin = i128::from(now) - i128::from(count) * i128::from(self.period.get());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Schedule, Slot};
+    use proptest::prelude::*;
+    use std::num::NonZeroU64;
+
+    proptest! {
+        /// Defect: times at the end of their range overflowed.
+        #[test]
+        fn a_schedule_begins_the_slot_that_it_is_told(period in 1..=u64::MAX, now in prop_oneof![any::<u64>(), Just(u64::MAX)], slot in any::<u64>()) {
+            let mut schedule = Schedule::new(NonZeroU64::new(period).unwrap());
+            schedule.synchronise(Slot::of_count(slot), now);
+            prop_assert_eq!(Slot::of_count(schedule.count(now)), Slot::of_count(slot));
+            prop_assert_eq!(schedule.start(schedule.count(now)), now);
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, refuse};
 use crate::observation_model::ObservationModel;
-use crate::outcomes::Feature;
+use crate::outcomes::NodeWeights;
 use serde::{Deserialize, Serialize};
 
 /// Smaller probabilities are treated as zero inside a logarithm.
@@ -58,7 +58,7 @@ impl Criterion {
 #[derive(Debug, Clone)]
 pub(crate) struct Scored {
     kind: Kind,
-    features: Vec<Feature>,
+    features: Vec<NodeWeights>,
     weights: Vec<f64>,
 }
 
@@ -92,7 +92,7 @@ impl Scored {
         })
     }
 
-    pub(crate) fn features(&self) -> &[Feature] {
+    pub(crate) fn features(&self) -> &[NodeWeights] {
         &self.features
     }
 

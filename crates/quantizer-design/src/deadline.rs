@@ -13,7 +13,7 @@ pub type Clock = fn() -> Duration;
 
 /// The monotonic clock of the standard library. WebAssembly without a system has none: there this clock stands still, so that no time limit
 /// ends a computation, and the caller hands in another.
-pub fn system_clock() -> Duration {
+pub(crate) fn system_clock() -> Duration {
     static START: OnceLock<Instant> = OnceLock::new();
     if cfg!(all(target_family = "wasm", target_os = "unknown")) {
         return Duration::ZERO;

@@ -7,7 +7,7 @@ use fewbits_binary_patterns::{
 use fewbits_core::Observation;
 use fewbits_numerics::error::{entries, positive, refuse};
 use fewbits_numerics::quadrature::gauss_legendre;
-use fewbits_quantizer_design::outcomes::{Feature, Table, explained, moments};
+use fewbits_quantizer_design::outcomes::{NodeWeights, Table, explained, moments};
 
 /// The estimator whose exact error is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,11 +81,11 @@ impl CodedSensors {
         let thresholds: Vec<Threshold> = thresholds.collect();
         // The problem is symmetric about zero: half of the axis is used with twice the weight.
         let mut nodes = Nodes::adapted(&source, 0.0, half_width, &thresholds, PANEL, gauss_legendre::<12>());
-        nodes.w.iter_mut().for_each(|w| *w *= 2.0);
+        nodes.weights.iter_mut().for_each(|w| *w *= 2.0);
         let of = |q: &BinaryQuantizer| {
             noise_deviations
                 .iter()
-                .map(|noise| q.probabilities_at(&nodes.x, *noise))
+                .map(|noise| q.probabilities_at(&nodes.points, *noise))
                 .collect()
         };
         let probability = quantizers.iter().map(of).collect();
@@ -158,10 +158,10 @@ impl CodedSensors {
 
     /// Weights of probability and first moment. The nodes cover one side, with the weight of both.
     #[doc(hidden)]
-    pub fn features(&self) -> [Feature; 2] {
-        let mass: Vec<f64> = self.nodes.w.iter().map(|w| 0.5 * w).collect();
-        let moment = mass.iter().zip(&self.nodes.x).map(|(w, x)| w * x).collect();
-        [Feature::of_all(mass), Feature::of_all(moment)]
+    pub fn features(&self) -> [NodeWeights; 2] {
+        let mass: Vec<f64> = self.nodes.weights.iter().map(|w| 0.5 * w).collect();
+        let moment = mass.iter().zip(&self.nodes.points).map(|(w, x)| w * x).collect();
+        [NodeWeights::of_all(mass), NodeWeights::of_all(moment)]
     }
 
     /// Exact error of the decoder that reads the Gray bits as a cell index and returns the cell's centre.
@@ -175,7 +175,7 @@ impl CodedSensors {
     /// MSE = E[x^2 + 2 V x m1 + V^2 m2]
     /// ```
     fn centre_mse(&self, assignment: &[usize]) -> f64 {
-        let zeros = || (vec![0.0; self.nodes.x.len()], vec![0.0; self.nodes.x.len()]);
+        let zeros = || (vec![0.0; self.nodes.points.len()], vec![0.0; self.nodes.points.len()]);
         let (mut moments, mut next) = (zeros(), zeros());
         for (bit, &sensor) in assignment.iter().enumerate().rev() {
             self.push_bit(bit, sensor, &moments, &mut next);
@@ -221,7 +221,7 @@ impl CodedSensors {
     pub fn centre_error(&self, (m1, m2): &Moments) -> f64 {
         let v = self.half_width;
         let mut sum = 0.0;
-        for (((m1, m2), x), w) in m1.iter().zip(m2).zip(&self.nodes.x).zip(&self.nodes.w) {
+        for (((m1, m2), x), w) in m1.iter().zip(m2).zip(&self.nodes.points).zip(&self.nodes.weights) {
             sum += w * (x * (x + 2.0 * v * m1) + v * v * m2);
         }
         sum
@@ -277,7 +277,7 @@ mod tests {
             let centre = left + 1.3 / 16.0;
             exact += w
                 .iter()
-                .zip(&nodes.x)
+                .zip(&nodes.points)
                 .map(|(w, x)| w * (x - centre) * (x - centre))
                 .sum::<f64>();
         });

@@ -80,7 +80,7 @@ pub fn adaptive(
         source,
         noise_deviation,
         rule,
-        levels: vec![nodes.w.clone(); sensors + 1],
+        levels: vec![nodes.weights.clone(); sensors + 1],
         nodes,
         history: Vec::with_capacity(sensors),
         errors: AdaptiveErrors { mle: 0.0, mmse: 0.0 },
@@ -105,11 +105,11 @@ impl Tree<'_> {
         let depth = self.history.len();
         if left == 0 {
             let w = &self.levels[depth];
-            let (mass, first) = moments(w, &self.nodes.x);
+            let (mass, first) = moments(w, &self.nodes.points);
             if mass > IMPOSSIBLE {
-                self.errors.mmse += squared_error(w, &self.nodes.x, first / mass);
+                self.errors.mmse += squared_error(w, &self.nodes.points, first / mass);
                 let mle = maximum_likelihood(&self.history, self.noise_deviation, self.source.reach());
-                self.errors.mle += squared_error(w, &self.nodes.x, mle);
+                self.errors.mle += squared_error(w, &self.nodes.points, mle);
             }
             return;
         }
@@ -117,7 +117,7 @@ impl Tree<'_> {
             let sign = if bit { 1.0 } else { -1.0 };
             let (above, below) = self.levels.split_at_mut(depth + 1);
             // Joint density of the unknown and the bits so far, at the nodes.
-            for ((child, w), x) in below[0].iter_mut().zip(&above[depth]).zip(&self.nodes.x) {
+            for ((child, w), x) in below[0].iter_mut().zip(&above[depth]).zip(&self.nodes.points) {
                 *child = w * cdf(sign * (x - threshold) / self.noise_deviation);
             }
             let repeated = self.history.last().is_some_and(|last| last.1 == bit);
@@ -158,14 +158,14 @@ impl Tree<'_> {
     }
 
     fn posterior(&self, w: &[f64]) -> Option<(f64, f64)> {
-        let (mass, first) = moments(w, &self.nodes.x);
-        (mass > IMPOSSIBLE).then(|| (first / mass, squared_error(w, &self.nodes.x, first / mass) / mass))
+        let (mass, first) = moments(w, &self.nodes.points);
+        (mass > IMPOSSIBLE).then(|| (first / mass, squared_error(w, &self.nodes.points, first / mass) / mass))
     }
 
     /// `sum_bit M1^2/M0` after a bit with threshold `t`. The threshold that maximises it minimises the expected posterior variance.
     fn explained(&self, w: &[f64], t: f64) -> f64 {
         let mut sums = [(0.0, 0.0); 2];
-        for (w, x) in w.iter().zip(&self.nodes.x) {
+        for (w, x) in w.iter().zip(&self.nodes.points) {
             let u = (x - t) / self.noise_deviation;
             for (sum, p) in sums.iter_mut().zip([cdf(-u), cdf(u)]) {
                 sum.0 += w * p;

@@ -96,7 +96,7 @@ fn division_map(bank: &Bank, grid: &Quantizer, scaled: impl Fn(f64, f64) -> f64)
     let log = |p: f64| p.max(FLOOR).ln();
     let tables = bank.groups().map(|(sensor, count)| {
         let bit = |bit: usize, cell: &Cell| {
-            let pairs = cell.nodes.x.iter().zip(&cell.nodes.w);
+            let pairs = cell.nodes.points.iter().zip(&cell.nodes.weights);
             let joint: f64 = pairs
                 .map(|(&x, &w)| w * sensor.quantizer().probabilities(x, sensor.noise_deviation())[bit])
                 .sum();
@@ -119,9 +119,9 @@ fn exact_division_map(bank: &Bank, grid: &Quantizer, outcomes: usize) -> Vec<f64
     let cells = cells(bank, grid);
     let (mut nodes, mut ends) = (Nodes::default(), Vec::with_capacity(cells.len()));
     for cell in &cells {
-        nodes.x.extend(&cell.nodes.x);
-        nodes.w.extend(&cell.nodes.w);
-        ends.push(nodes.x.len());
+        nodes.points.extend(&cell.nodes.points);
+        nodes.weights.extend(&cell.nodes.weights);
+        ends.push(nodes.points.len());
     }
     let mut estimates = vec![0.0; outcomes];
     let mut score = vec![0.0; cells.len()];

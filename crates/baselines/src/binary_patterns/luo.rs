@@ -91,7 +91,7 @@ impl Luo {
         let (bank, v) = (self.bank()?, self.half_width);
         let nodes = Nodes::adapted(&self.source, -v, v, &bank.thresholds(), 1.0, gauss_legendre::<12>());
         let (mut soft, mut majority) = (0.0, 0.0);
-        for (&x, &w) in nodes.x.iter().zip(&nodes.w) {
+        for (&x, &w) in nodes.points.iter().zip(&nodes.weights) {
             // (mean, variance) of both estimates given x.
             let (mut by_mean, mut by_vote) = ((0.0, 0.0), (0.0, 0.0));
             // Digit `b` weighs `V / 2^b`, and the bits of different digits are independent given `x`.

@@ -65,11 +65,11 @@ pub(crate) fn even_nodes(source: &Source, width: f64, rule: &Rule) -> Nodes {
         Kind::Gaussian { deviation } => 1.5 * deviation,
     };
     let panels = ((2.0 * reach / width.min(widest)).ceil() as usize).clamp(1, MAX_PANELS);
-    let (x, w) = rule
+    let (points, weights) = rule
         .panels(-reach, reach, panels)
         .map(|(x, w)| (x, w * source.density(x)))
         .unzip();
-    Nodes { x, w }
+    Nodes { points, weights }
 }
 
 #[cfg(test)]

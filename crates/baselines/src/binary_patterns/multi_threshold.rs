@@ -78,9 +78,9 @@ fn optimum(
     let rows: Vec<(usize, Vec<f64>)> = thresholds
         .iter()
         .map(|&t| {
-            let first = nodes.x.partition_point(|&x| x < t - band);
-            let last = nodes.x.partition_point(|&x| x <= t + band);
-            let row = nodes.x[first..last]
+            let first = nodes.points.partition_point(|&x| x < t - band);
+            let last = nodes.points.partition_point(|&x| x <= t + band);
+            let row = nodes.points[first..last]
                 .iter()
                 .map(|&x| log_information((x - t) / noise_deviation, noise_deviation).exp())
                 .collect();
@@ -125,14 +125,14 @@ struct Objective {
 
 impl Objective {
     fn of(rows: &[(usize, Vec<f64>)], rho: &[f64], nodes: &Nodes) -> Self {
-        let mut information = vec![0.0; nodes.x.len()];
+        let mut information = vec![0.0; nodes.points.len()];
         for ((first, row), r) in rows.iter().zip(rho) {
             for (m, i) in information[*first..].iter_mut().zip(row) {
                 *m += r * i;
             }
         }
         let mut value = 0.0;
-        for (m, w) in information.iter_mut().zip(&nodes.w) {
+        for (m, w) in information.iter_mut().zip(&nodes.weights) {
             value += w / *m;
             // From here on the slot contains w / M^2.
             *m = w / (*m * *m);

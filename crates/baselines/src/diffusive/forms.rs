@@ -7,9 +7,7 @@ use fewbits_core::{Belief, Density, Gaussian, Likelihood};
 use fewbits_densities::{Component, Mixture, systematic};
 use fewbits_diffusive::form::{Added, AddedDensity, AddedForm, SliceMoments, Update};
 use fewbits_diffusive::message::AddedNumbers;
-use fewbits_diffusive::{
-    Error, Form, JointBelief, PositionBelief, Posterior, RateModel, SearchBox, SourceLikelihood, Travelling,
-};
+use fewbits_diffusive::{Error, Form, Posterior, RateModel, SearchBox, SentBelief, SourceLikelihood, Travelling};
 use fewbits_mixture_codec::{Clumps, MixtureFit};
 use fewbits_numerics::error::{at_least_one, entries, refuse};
 use nalgebra::{SMatrix, SVector, Vector2};
@@ -104,10 +102,10 @@ impl<const N: usize, const K: usize> AddedForm for LpgForm<N, K> {
     fn project(&self, posterior: &Posterior, rate: &RateModel, _: Option<&Update<'_>>) -> Result<Travelling, Error> {
         if matches!(rate, RateModel::Joint(_)) && posterior.rates.is_some() {
             let fit = lpg_with_rate(posterior, N, K, rate)?;
-            return Ok(Travelling::WithRate(JointBelief::Other(Arc::new(fit.belief))));
+            return Ok(Travelling::WithRate(SentBelief::Other(Arc::new(fit.belief))));
         }
         let fit = lpg_of_position(posterior, N, K)?;
-        Ok(Travelling::Position(PositionBelief::Other(Arc::new(fit.belief))))
+        Ok(Travelling::Position(SentBelief::Other(Arc::new(fit.belief))))
     }
 
     fn numbers(&self, components: usize, degree: usize, with_rate: bool) -> usize {
@@ -116,9 +114,9 @@ impl<const N: usize, const K: usize> AddedForm for LpgForm<N, K> {
 
     fn read(&self, added: &AddedNumbers) -> Result<Travelling, Error> {
         Ok(if added.with_rate {
-            Travelling::WithRate(JointBelief::Other(Arc::new(read::<3>(added)?)))
+            Travelling::WithRate(SentBelief::Other(Arc::new(read::<3>(added)?)))
         } else {
-            Travelling::Position(PositionBelief::Other(Arc::new(read::<2>(added)?)))
+            Travelling::Position(SentBelief::Other(Arc::new(read::<2>(added)?)))
         })
     }
 }
@@ -289,7 +287,7 @@ impl<const N: usize> AddedForm for ParticlesForm<N> {
             Component::new(1.0, g.mean() + (x - g.mean()) * shrink, g.covariance() * h2)
         });
         let mixture = Mixture::new(parts.collect::<Result<_, _>>()?)?;
-        Ok(Travelling::Position(PositionBelief::Mixture(mixture)))
+        Ok(Travelling::Position(SentBelief::Mixture(mixture)))
     }
 }
 
@@ -309,7 +307,7 @@ impl AddedForm for LaplaceForm {
         update: Option<&Update<'_>>,
     ) -> Result<Travelling, Error> {
         let single = |gaussian: &Gaussian<2>| -> Result<Travelling, Error> {
-            Ok(Travelling::Position(PositionBelief::Mixture(Mixture::single(gaussian)?)))
+            Ok(Travelling::Position(SentBelief::Mixture(Mixture::single(gaussian)?)))
         };
         let Some(update) = update else {
             return single(&posterior.gaussian());

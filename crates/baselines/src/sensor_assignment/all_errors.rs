@@ -48,7 +48,7 @@ pub fn all_errors(sensors: &CodedSensors, estimator: Estimator) -> Result<AllErr
     };
     match estimator {
         Estimator::CellCentre => {
-            let rows = sensors.nodes.x.len();
+            let rows = sensors.nodes.points.len();
             let mut moments = vec![(vec![0.0; rows], vec![0.0; rows]); n + 1];
             centre_tree(sensors, n, &mut vec![0; n], 0, &mut moments, &mut tally);
         }
@@ -111,7 +111,7 @@ struct Half {
 impl Half {
     fn new(sensors: &CodedSensors, members: &[usize], bits: std::ops::Range<usize>) -> Self {
         let (mut orders, mut values) = (Vec::new(), Vec::new());
-        let nodes = sensors.nodes.x.len();
+        let nodes = sensors.nodes.points.len();
         for_permutations(members.len(), |p| {
             let order: Vec<usize> = p.iter().map(|&i| members[i]).collect();
             let own = bits

@@ -26,9 +26,9 @@ impl Bank {
     ) -> Result<f64, Error> {
         let (score, nodes) = self.posterior_score(observations)?;
         let w = weights_under(&score, &nodes);
-        let (mass, _) = moments(&w, &nodes.x);
+        let (mass, _) = moments(&w, &nodes.points);
         Ok(if mass > 0.0 {
-            squared_error(&w, &nodes.x, estimate) / mass
+            squared_error(&w, &nodes.points, estimate) / mass
         } else {
             0.0
         })
@@ -38,13 +38,13 @@ impl Bank {
     fn posterior_score(&self, observations: &[Observation<bool>]) -> Result<(Vec<f64>, Nodes), Error> {
         entries("observations", observations.len(), self.sensors())?;
         let nodes = self.fine_nodes();
-        let mut score = vec![0.0; nodes.x.len()];
+        let mut score = vec![0.0; nodes.points.len()];
         for (n, observation) in observations.iter().enumerate() {
             let Some(bit) = observation.received() else {
                 continue;
             };
             let sensor = self.sensor(n);
-            for (s, x) in score.iter_mut().zip(&nodes.x) {
+            for (s, x) in score.iter_mut().zip(&nodes.points) {
                 *s += sensor.log_probabilities(*x)[usize::from(*bit)];
             }
         }
@@ -60,7 +60,7 @@ impl Bank {
         let nodes = self.fine_nodes();
         let mut impossible = Vec::new();
         self.for_outcomes(&nodes, |index, w| {
-            let (mass, first) = moments(w, &nodes.x);
+            let (mass, first) = moments(w, &nodes.points);
             if mass > IMPOSSIBLE {
                 estimates[index] = first / mass;
             } else {
@@ -69,7 +69,7 @@ impl Bank {
         });
         // Outcomes whose probability underflows are computed in logarithms, which takes longer.
         if !impossible.is_empty() {
-            self.for_log_outcomes(&nodes.x, |index, score| {
+            self.for_log_outcomes(&nodes.points, |index, score| {
                 if impossible.binary_search(&index).is_ok() {
                     estimates[index] = mean_under(score, &nodes);
                 }
@@ -89,9 +89,9 @@ impl Bank {
         let nodes = self.fine_nodes();
         let mut error = 0.0;
         self.for_outcomes(&nodes, |_, w| {
-            let (mass, first) = moments(w, &nodes.x);
+            let (mass, first) = moments(w, &nodes.points);
             if mass > IMPOSSIBLE {
-                error += squared_error(w, &nodes.x, first / mass);
+                error += squared_error(w, &nodes.points, first / mass);
             }
         });
         Ok(error)
@@ -112,7 +112,7 @@ impl Bank {
 
 /// Mean of the source if its density is multiplied by the exponential of `score`, which is given at the nodes.
 fn mean_under(score: &[f64], nodes: &Nodes) -> f64 {
-    let (mass, first) = moments(&weights_under(score, nodes), &nodes.x);
+    let (mass, first) = moments(&weights_under(score, nodes), &nodes.points);
     if mass > 0.0 { first / mass } else { 0.0 }
 }
 
@@ -120,5 +120,9 @@ fn mean_under(score: &[f64], nodes: &Nodes) -> f64 {
 /// does not underflow.
 fn weights_under(score: &[f64], nodes: &Nodes) -> Vec<f64> {
     let best = score.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    score.iter().zip(&nodes.w).map(|(s, w)| w * (s - best).exp()).collect()
+    score
+        .iter()
+        .zip(&nodes.weights)
+        .map(|(s, w)| w * (s - best).exp())
+        .collect()
 }

@@ -28,7 +28,7 @@ impl LookupTable {
         let nodes = self.bank.fine_nodes();
         let mut error = 0.0;
         self.bank
-            .for_outcomes(&nodes, |index, w| error += squared_error(w, &nodes.x, self.estimates[index]));
+            .for_outcomes(&nodes, |index, w| error += squared_error(w, &nodes.points, self.estimates[index]));
         error
     }
 

@@ -144,11 +144,11 @@ impl Bank {
         let counts = |g: &Exchangeable| {
             let quantizer = g.sensor.quantizer();
             quantizer
-                .probabilities_at(&nodes.x, g.sensor.noise_deviation())
+                .probabilities_at(&nodes.points, g.sensor.noise_deviation())
                 .of_counts(g.count)
         };
         let tables: Vec<Table> = self.groups.iter().map(counts).collect();
-        for_each(&tables, &nodes.w, visit);
+        for_each(&tables, &nodes.weights, visit);
     }
 
     /// Index of the counts of a bit string; an error if its length is not the number of sensors.

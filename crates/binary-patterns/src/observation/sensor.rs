@@ -35,6 +35,7 @@ impl PatternSensor {
     }
 
     /// `[ln P(0|x), ln P(1|x)]`.
+    #[doc(hidden)]
     pub fn log_probabilities(&self, x: f64) -> [f64; 2] {
         self.quantizer.log_probabilities(x, self.noise_deviation)
     }

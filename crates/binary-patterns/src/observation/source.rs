@@ -162,13 +162,13 @@ impl Threshold {
     }
 }
 
-/// Quadrature nodes `x` and weights `w` that include the source density: `E[f(X)] = sum w f(x)`.
+/// A quadrature rule that includes the source density: `E[f(X)] = sum w f(x)` over points `x` and weights `w`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Nodes {
-    /// Nodes, increasing.
-    pub x: Vec<f64>,
+    /// Points, increasing.
+    pub points: Vec<f64>,
     /// Weights, which include the source's density.
-    pub w: Vec<f64>,
+    pub weights: Vec<f64>,
 }
 
 impl Nodes {
@@ -202,8 +202,10 @@ impl Nodes {
             } else {
                 (x + step).max(x + 1e-13 * widest)
             };
-            nodes.x.extend(rule.on(x, end).map(|(x, _)| x));
-            nodes.w.extend(rule.on(x, end).map(|(x, w)| w * source.density(x)));
+            nodes.points.extend(rule.on(x, end).map(|(x, _)| x));
+            nodes
+                .weights
+                .extend(rule.on(x, end).map(|(x, w)| w * source.density(x)));
             x = end;
         }
         nodes
@@ -211,7 +213,7 @@ impl Nodes {
 
     /// `sum w f(x)`.
     pub fn expectation(&self, f: impl Fn(f64) -> f64) -> f64 {
-        self.x.iter().zip(&self.w).map(|(&x, &w)| w * f(x)).sum()
+        self.points.iter().zip(&self.weights).map(|(&x, &w)| w * f(x)).sum()
     }
 }
 
@@ -234,7 +236,7 @@ mod tests {
             let integral = |u: f64| u * cdf(u) + pdf(u);
             let exact = 0.5 * noise * (integral(0.75 / noise) - integral(-1.25 / noise));
             assert_relative_eq!(p, exact, max_relative = 1e-12);
-            last = nodes.x.len();
+            last = nodes.points.len();
         }
         assert!(last < 600, "{last}");
     }

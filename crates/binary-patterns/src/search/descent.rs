@@ -162,7 +162,7 @@ impl<'a> Kernel<'a> {
         let of_noise = |noise: &f64| -> Vec<Table> {
             let quantizers = descent.candidates.iter();
             quantizers
-                .map(|q| q.probabilities_at(&candidates.nodes.x, *noise))
+                .map(|q| q.probabilities_at(&candidates.nodes.points, *noise))
                 .collect()
         };
         let p: Vec<Vec<Table>> = noises.iter().map(of_noise).collect();
@@ -219,7 +219,7 @@ impl<'a> Kernel<'a> {
         }
         let outcomes = groups.iter().fold(1u128, |o, g| o.saturating_mul(g.2 as u128 + 1));
         Error::at_most("the table of outcomes", outcomes, MAX_OUTCOMES)?;
-        let mut others = Outcomes::new(&self.candidates.nodes.w);
+        let mut others = Outcomes::new(&self.candidates.nodes.weights);
         for (class, c, count) in groups {
             others = others.with(&self.p[class][c].of_counts(count), self.candidates.flips[c]);
         }

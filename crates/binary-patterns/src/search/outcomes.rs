@@ -86,9 +86,9 @@ impl Candidates {
     /// For every table and count, two rows: the probability at the nodes, and the same times `x`.
     pub(crate) fn integrands<'t>(&self, tables: impl Iterator<Item = &'t Table>) -> DMatrix<f64> {
         let rows: Vec<&[f64]> = tables.flat_map(Table::iter).collect();
-        DMatrix::from_fn(2 * rows.len(), self.nodes.x.len(), |row, at| {
+        DMatrix::from_fn(2 * rows.len(), self.nodes.points.len(), |row, at| {
             let p = rows[row / 2][at];
-            if row % 2 == 0 { p } else { p * self.nodes.x[at] }
+            if row % 2 == 0 { p } else { p * self.nodes.points[at] }
         })
     }
 

@@ -77,11 +77,13 @@ impl<const M: usize> Ellipsoid<M> {
     }
 
     /// The image of a point of the unit ball: `sqrt(eta) L point`.
+    #[doc(hidden)]
     pub fn from_ball(&self, point: &SVector<f64, M>) -> SVector<f64, M> {
         self.lower * point * self.threshold.sqrt()
     }
 
     /// `ln` of the ellipsoid's volume, `ln det(S)/2 + M/2 ln(eta) + ln V_M`. The unit ball has `V_M = V_{M-2} 2 pi/M`.
+    #[doc(hidden)]
     pub fn log_volume(&self) -> f64 {
         let log_determinant: f64 = self.lower.diagonal().iter().map(|d| d.ln()).sum();
         let (mut ball, mut dimension) = if M % 2 == 1 { (2.0, 1) } else { (1.0, 0) };

@@ -7,7 +7,7 @@ use fewbits_baselines::cfwmd::trigger::StochasticTrigger;
 use fewbits_cfwmd::ellipsoid::Ellipsoid;
 use fewbits_cfwmd::rule::{OwnRecursion, OwnStep};
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{Factor, Gaussian};
+use fewbits_core::{Factor, Gaussian, Sensing};
 use fewbits_filters::kalman;
 use fewbits_models::{LinearSensor, ReceivedPower, constant_velocity_1d};
 use fewbits_numerics::normal;
@@ -170,8 +170,9 @@ fn compute(name: &str, inputs: &Value) -> Option<Vec<f64>> {
             let position = Vector2::new(number("sx"), number("sy"));
             let sensor =
                 ReceivedPower::<2>::new(position, [0, 1], number("P0"), number("alpha"), number("n"), 1.0).unwrap();
-            let slope = sensor.slope_at(number("x"), number("y"));
-            vec![sensor.amplitude_at(number("x"), number("y")), slope[0], slope[1]]
+            let place = Vector2::new(number("x"), number("y"));
+            let slope = sensor.jacobian(&place);
+            vec![sensor.mean(&place)[0], slope[0], slope[1]]
         }
         "censpost" => {
             let silence = Silence {

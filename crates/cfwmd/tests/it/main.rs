@@ -16,7 +16,7 @@ mod wild;
 
 use fewbits_baselines::cfwmd::likelihood_of_particles;
 use fewbits_cfwmd::Error;
-use fewbits_cfwmd::censored::Censored;
+use fewbits_cfwmd::censored::{Censored, MissingReports};
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::CensoringRule;
 use fewbits_core::{Evidence, Gaussian, Likelihood, Link, Observation, Observed, Sensing, Tilted};
@@ -81,7 +81,17 @@ impl Silence {
             CensoringRule::scalar(1.0, 0.0).unwrap()
         };
         let (centre, noise) = (Vector1::new(self.centre), Matrix1::new(self.noise_variance));
-        Censored::silence(&rule, &centre, &noise, &Link::lossy(self.loss).unwrap(), self.count).unwrap()
+        Censored::missing(
+            &rule,
+            &centre,
+            &noise,
+            &Link::lossy(self.loss).unwrap(),
+            MissingReports {
+                nothing: self.count,
+                lost: 0,
+            },
+        )
+        .unwrap()
     }
 
     fn moments(&self, mean: f64, variance: f64) -> Result<Tilted<1>, Error> {

@@ -10,7 +10,7 @@ use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::laws::factor::tilted_is_quadrature;
 use fewbits_core::laws::message::{decoding_is_total, round_trip};
 use fewbits_core::laws::scheme::{deterministic, honesty, total_probability, total_probability_with};
-use fewbits_core::number::Levels;
+use fewbits_core::number::EvenLevels;
 use fewbits_core::{BitString, Deterministic, Factor, Gaussian, Link, NumberFormat, Observation, Scheme, Sensing};
 use fewbits_models::{LinearSensor, ReceivedPower, ScalarSensor, constant_velocity_1d};
 use fewbits_monte_carlo::Stream;
@@ -119,7 +119,7 @@ fn covariance_feedback_and_the_random_trigger_are_lawful() {
 
 #[test]
 fn levels_are_cells_outside_the_interval_of_silence() {
-    let levels = Levels::new(-4.0, 5.0, 4).unwrap();
+    let levels = EvenLevels::new(-4.0, 5.0, 4).unwrap();
     let measurements: Vec<_> = (-24..=24).map(|i| Vector1::new(f64::from(i) * 0.5)).collect();
     let broadcast = Vector2::new(0.5, 2.0);
     for threshold in [0.0, 0.02, 0.45, 6.0] {
@@ -162,13 +162,14 @@ fn vectors_are_lawful() {
     let scheme = Censoring::new(sensor, rule, NumberFormat::Double).unwrap();
     let broadcast = Vector2::new(0.5, 2.0);
     draws_nothing(&scheme, &broadcast, broadcast);
+    let deviations = sensor.noise_covariance().cholesky().unwrap().l();
     for link in links() {
         let nothing = scheme.factor(&broadcast, &Observation::Nothing, &link).unwrap();
         let lost = scheme.factor(&broadcast, &Observation::Lost, &link).unwrap();
         let mut rng = Stream::new(9).rng();
         for m in [Vector2::new(0.0, 2.5), Vector2::new(3.0, -1.0)] {
             let [p, known] = [&nothing, &lost].map(|factor| factor.log_likelihood(&m).exp());
-            let measure = |rng: &mut _| m + sensor.noise_factor() * Vector2::new(draw(rng), draw(rng));
+            let measure = |rng: &mut _| m + deviations * Vector2::new(draw(rng), draw(rng));
             honesty(&scheme, &broadcast, &link, &mut rng, 40_000, measure, |o| matches!(o, Observation::Nothing), p)
                 .unwrap();
             if link.erasure() > 0.0 {

@@ -3,7 +3,7 @@
 use super::instant::Qualifier;
 use crate::error::Error;
 use fewbits_diffusion::{
-    Flow, LeakBelief, LeakPrior, Plan, PotentialFlow, Reading, Scheme, SensorField, StepControl, Transport,
+    Flow, FluxRule, LeakBelief, LeakPrior, Plan, PotentialFlow, Reading, SensorField, StepControl, Transport,
 };
 use fewbits_table::Side;
 use serde::Deserialize;
@@ -152,7 +152,7 @@ impl Rooms {
             flow => PotentialFlow::new(&domain, flow / self.height).map_err(&refused)?.flow,
         };
         let transport =
-            Transport::new(domain, self.diffusivity, &wind, self.decay, Scheme::default()).map_err(&refused)?;
+            Transport::new(domain, self.diffusivity, &wind, self.decay, FluxRule::default()).map_err(&refused)?;
         let points: Vec<[f64; 3]> = self
             .sensor
             .iter()

@@ -10,20 +10,17 @@
 //! | cells with weights and a constant: sign bits, quantizer cells, silence, symbols, over lossy and flipping links | [`Levels`] |
 //! | an observation that does not depend on `m` | [`Constant`] |
 //! | any of the three above, of a scalar | [`Scalar`] |
-//! | a factor of a report that may be an outlier | [`Robust`] |
 //! | several observations of one `m` | [`Product`], [`Repeated`] |
 
 mod levels;
 mod moments;
 mod product;
-mod robust;
 mod scalar;
 mod value;
 
 pub use levels::Levels;
 pub use moments::{Feature, tilted_by_quadrature};
 pub use product::{Product, Repeated};
-pub use robust::Robust;
 pub use scalar::{Constant, Scalar};
 pub use value::Value;
 

@@ -68,7 +68,7 @@ pub fn total_probability_with<const M: usize, S: Scheme<M>>(
 ///
 /// # Errors
 /// If the sum is not one.
-pub fn link_delivers_once(link: &Link) -> Result<(), Violation> {
+fn link_delivers_once(link: &Link) -> Result<(), Violation> {
     const LAW: &str = "a report arrives, is lost, or is known to be lost";
     let of = |observation| link.delivery::<()>(&observation);
     let (arrives, nothing, lost) = (of(Observation::Received(())), of(Observation::Nothing), of(Observation::Lost));

@@ -35,7 +35,7 @@ proptest! {
                 let whole = BitString::from_bytes(bytes, bits).unwrap();
                 let mut writer = BitWriter::new();
                 for bit in 0..bits {
-                    writer.write_bit(whole.bytes()[bit / 8] >> (7 - bit % 8) & 1 == 1);
+                    writer.write(u64::from(whole.bytes()[bit / 8] >> (7 - bit % 8) & 1), 1).unwrap();
                 }
                 writer.finish()
             })
@@ -86,7 +86,7 @@ fn misuse_is_refused_and_writes_nothing() {
     assert!(BitString::from_bytes(vec![0], 9).is_err());
     let two = BitString::from_bytes(vec![0b1100_0000], 2).unwrap();
     let mut reader = BitReader::new(&two);
-    assert!(reader.read_bit().unwrap());
+    assert_eq!(reader.read(1), Ok(1));
     assert_eq!(reader.finish(), Err(CodecError::TrailingBits { left: 1 }));
     assert_eq!(two.clone().with_flipped(1).bytes(), [0b1000_0000]);
     assert_eq!(two.clone().with_flipped(7), two);

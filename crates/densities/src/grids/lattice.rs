@@ -10,7 +10,7 @@ use fewbits_numerics::normal::log_pdf_with;
 const MAX_NODES: usize = 1 << 22;
 
 /// A probability density over several numbers, given by its values at the nodes of a lattice: one [`UniformGrid`] per number. The number of axes
-/// is known at run time. Values are in the order of the nodes, the last axis fastest; their sum times [`Lattice::volume`] is one.
+/// is known at run time. Values are in the order of the nodes, the last axis fastest; their sum times the product of the spacings is one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lattice {
     axes: Vec<UniformGrid>,
@@ -90,11 +90,6 @@ impl Lattice {
     /// Values at the nodes.
     pub fn density(&self) -> &[f64] {
         &self.density
-    }
-
-    /// The product of the spacings.
-    pub fn volume(&self) -> f64 {
-        self.volume
     }
 
     /// Positions of all nodes along one axis, in the order of the nodes; empty if there is no such axis.

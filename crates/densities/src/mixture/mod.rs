@@ -138,24 +138,6 @@ impl<const D: usize> Mixture<D> {
         Particles::from_draws(count, || self.components[chosen.next().unwrap_or(0)].draw(rng))
     }
 
-    /// The marginal density of the chosen coordinates, in the given order.
-    ///
-    /// # Errors
-    /// If an axis is out of range or given twice.
-    pub fn marginal<const K: usize>(&self, axes: [usize; K]) -> Result<Mixture<K>, Error> {
-        for (i, axis) in axes.iter().enumerate() {
-            if *axis >= D || axes[..i].contains(axis) {
-                return refuse("axes", format!("{axes:?}"), format!("different axes below {D}"));
-            }
-        }
-        let components = self.components.iter().map(|c| {
-            let mean = SVector::from_fn(|i, _| c.mean()[axes[i]]);
-            let covariance = SMatrix::from_fn(|i, j| c.covariance()[(axes[i], axes[j])]);
-            Component::new(c.weight, mean, covariance)
-        });
-        Mixture::new(components.collect::<Result<_, _>>()?)
-    }
-
     /// The density of `matrix x + shift` for `x` with this density.
     ///
     /// # Errors

@@ -7,7 +7,7 @@ pub(crate) mod weights;
 
 pub use gaussian_cloud::GaussianCloud;
 pub use systematic::{systematic, systematic_into};
-pub use weights::{Categorical, normalise_log_weights};
+pub use weights::Categorical;
 
 use crate::Error;
 use fewbits_core::columns::state_at;

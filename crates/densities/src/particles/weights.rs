@@ -1,7 +1,6 @@
 //! Weights of particles: random selection in proportion, copies of auxiliary rows, normalisation.
 
 use crate::Error;
-use fewbits_numerics::ArgumentError;
 use fewbits_numerics::kernels::{exp_minus, largest_number, vectorised};
 use rand::{Rng, RngExt};
 
@@ -49,27 +48,6 @@ pub(crate) fn gather_rows(rows: &[f64], width: usize, chosen: &[u32], out: &mut 
             out.extend_from_slice(&rows[start..start + width]);
         }
     }
-}
-
-/// Normalises log weights: subtracts `ln sum exp` from each and writes their exponentials, which then sum to one, to `weights`. Returns
-/// `ln sum exp` and the effective sample size. On failure both slices are unchanged.
-///
-/// ```
-/// let (mut logs, mut weights) = ([-1000.0, -1000.0 + 3_f64.ln()], [0.0; 2]);
-/// let (log_sum, size) = fewbits_densities::normalise_log_weights(&mut logs, &mut weights)?;
-/// assert!((weights[1] - 0.75).abs() < 1e-12 && (log_sum - (4_f64.ln() - 1000.0)).abs() < 1e-9 && (size - 1.6).abs() < 1e-12);
-/// # Ok::<(), fewbits_densities::Error>(())
-/// ```
-///
-/// # Errors
-/// If the slices have different lengths; [`Error::NotANumber`] if a log weight is NaN or `+inf`; [`Error::Impossible`] if
-/// all are `-inf`, or there are none.
-pub fn normalise_log_weights(logs: &mut [f64], weights: &mut [f64]) -> Result<(f64, f64), Error> {
-    if logs.len() != weights.len() {
-        let expected = format!("{}, one per log weight", logs.len());
-        return Err(ArgumentError::new("weights", format!("{} numbers", weights.len()), expected).into());
-    }
-    normalise(logs, weights)
 }
 
 /// Normalises log weights and writes their exponentials to `weights`. Returns `ln sum exp` and the effective sample size. On failure

@@ -2,8 +2,8 @@
 
 use fewbits_diffusion::Divergence;
 use fewbits_diffusion::{
-    Boundary, Cell, Domain, Flow, Grid, Patch, PerCell, Plan, PotentialFlow, Release, Scheme, Source, Steady,
-    StepControl, Transient, Transport,
+    Boundary, CellKind, Domain, Flow, FluxRule, Grid, Patch, PerCell, Plan, PotentialFlow, Source, Steady, StepControl,
+    TimedSource, Transient, Transport,
 };
 use serde_json::Value;
 
@@ -69,13 +69,13 @@ fn domain(all: &Value, name: &str, split: usize) -> Domain {
             Boundary::Absorbing
         };
         let offset = |point: [f64; 3]| [point[0] - 10.0 * SQUARE, point[1] - 10.0 * SQUARE];
-        let cells: Vec<Cell> = (0..grid.cells())
+        let cells: Vec<CellKind> = (0..grid.cells())
             .map(|cell| {
                 let [x, y] = offset(grid.centre(cell));
                 if x.hypot(y) < radius {
-                    Cell::Free
+                    CellKind::Free
                 } else {
-                    Cell::Blocked(law)
+                    CellKind::Blocked(law)
                 }
             })
             .collect();
@@ -102,12 +102,12 @@ fn domain(all: &Value, name: &str, split: usize) -> Domain {
         "burst-ground" => {}
         other => panic!("unknown case {other}"),
     }
-    let cells = vec![Cell::Free; grid.cells()];
+    let cells = vec![CellKind::Free; grid.cells()];
     Domain::new(grid, &cells, sides).unwrap()
 }
 
 impl Model {
-    pub fn new(all: &Value, name: &str, split: usize, scheme: Scheme) -> Self {
+    pub fn new(all: &Value, name: &str, split: usize, scheme: FluxRule) -> Self {
         let case = all["cases"][name].clone();
         let domain = domain(all, name, split);
         let everywhere = case["diffusivity"].as_f64().unwrap();
@@ -192,14 +192,14 @@ impl Model {
                 vec![seen(there, back), seen(back, there)]
             }
             "budget" => {
-                let budget = self.transport.budget(&self.concentration(&entry["source"])).unwrap();
-                assert!((budget.removed() - 1.0).abs() < 1e-10, "{} of 1 is accounted for", budget.removed());
+                let balance = self.transport.balance(&self.concentration(&entry["source"])).unwrap();
+                assert!((balance.removed() - 1.0).abs() < 1e-10, "{} of 1 is accounted for", balance.removed());
                 let part = |name: &Value| match name.as_str().unwrap() {
-                    "mass" => budget.mass,
-                    "decayed" => budget.decayed,
-                    "leak" => budget.leaked,
-                    "I" => budget.inflow,
-                    "O" => budget.outflow,
+                    "mass" => balance.mass,
+                    "decayed" => balance.decayed,
+                    "leak" => balance.leaked,
+                    "I" => balance.inflow,
+                    "O" => balance.outflow,
                     other => panic!("unknown part {other}"),
                 };
                 entry["parts"].as_array().unwrap().iter().map(part).collect()
@@ -239,7 +239,7 @@ impl Model {
             }
             "release" | "mass" => {
                 let stop = entry["stop"].as_f64().unwrap();
-                let release = Release {
+                let release = TimedSource {
                     patch: self.square(&entry["source"]),
                     rate: 1.0,
                     start: 0.0,
@@ -249,7 +249,7 @@ impl Model {
                 let initial = vec![0.0; domain.free().len()];
                 let snapshots = run.run(&initial, &[release], &numbers(&entry["times"])).unwrap();
                 if entry["quantity"] == "mass" {
-                    let mass = |field: &[f64]| self.transport.budget(field).unwrap().mass;
+                    let mass = |field: &[f64]| self.transport.balance(field).unwrap().mass;
                     return snapshots.iter().map(|snapshot| mass(&snapshot.concentration)).collect();
                 }
                 let sensors = self.patches(&entry["sensors"]);

@@ -5,7 +5,7 @@ use crate::slab::{SlabWall, green as slab_green};
 use crate::sphere::Sphere;
 use crate::two_media::TwoMedia;
 use fewbits_diffusion::{
-    Boundary, Cell, Domain, Flow, Grid, Patch, Release, Scheme, Snapshot, StepControl, Transient, Transport,
+    Boundary, CellKind, Domain, Flow, FluxRule, Grid, Patch, Snapshot, StepControl, TimedSource, Transient, Transport,
 };
 use fewbits_models::diffusion::{Air, Ground, Wall};
 use fewbits_numerics::quadrature::Rule;
@@ -200,7 +200,7 @@ fn boundary(wall: SlabWall) -> Boundary {
 fn burst(transport: &Transport, patch: &Patch, age: f64) -> Snapshot {
     // Released within a tenth of a thousandth of the age: the mean delay is taken off.
     let short = 1e-4 * age;
-    let release = Release {
+    let release = TimedSource {
         patch: patch.clone(),
         rate: short.recip(),
         start: 0.0,
@@ -216,9 +216,10 @@ fn burst(transport: &Transport, patch: &Patch, age: f64) -> Snapshot {
 /// Largest errors on a line of cells of 1 m / n, relative to the largest value.
 fn line_error(cells: usize, sides: [Boundary; 2], media: impl Fn(f64) -> f64, exact: impl Fn(f64) -> f64) -> f64 {
     let grid = Grid::uniform(&[cells], 1.0 / cells as f64).unwrap();
-    let domain = Domain::new(grid, &vec![Cell::Free; cells], [sides, CLOSED, CLOSED]).unwrap();
+    let domain = Domain::new(grid, &vec![CellKind::Free; cells], [sides, CLOSED, CLOSED]).unwrap();
     let diffusivity = domain.sample(|[x, ..]| media(x));
-    let transport = Transport::new(domain.clone(), diffusivity, &Flow::still(&domain), 0.0, Scheme::default()).unwrap();
+    let transport =
+        Transport::new(domain.clone(), diffusivity, &Flow::still(&domain), 0.0, FluxRule::default()).unwrap();
     // The point of release is between two cells.
     let half = 0.75 / cells as f64;
     let patch = domain.block([0.4 - half, 0.0, 0.0], [0.4 + half, 0.0, 0.0]).unwrap();
@@ -264,14 +265,14 @@ fn staircase_error(
 ) -> f64 {
     let kind = |cell: usize| {
         if inside(grid.centre(cell)) {
-            Cell::Free
+            CellKind::Free
         } else {
-            Cell::Blocked(boundary(wall))
+            CellKind::Blocked(boundary(wall))
         }
     };
-    let cells: Vec<Cell> = (0..grid.cells()).map(kind).collect();
+    let cells: Vec<CellKind> = (0..grid.cells()).map(kind).collect();
     let domain = Domain::new(grid, &cells, [CLOSED; 3]).unwrap();
-    let transport = Transport::new(domain.clone(), 0.5, &Flow::still(&domain), 0.0, Scheme::default()).unwrap();
+    let transport = Transport::new(domain.clone(), 0.5, &Flow::still(&domain), 0.0, FluxRule::default()).unwrap();
     let patch = domain.block(lower, upper).unwrap();
     let field = burst(&transport, &patch, 0.1).concentration;
     let exact = domain.sample(exact);
@@ -337,11 +338,12 @@ fn boxes_converge_to_half_spaces() {
         let error = |split: usize| {
             let (counts, width) = ([12 * split, 12 * split, 7 * split], 0.4 / split as f64);
             let grid = Grid::uniform(&counts, width).unwrap();
-            let cells = vec![Cell::Free; grid.cells()];
+            let cells = vec![CellKind::Free; grid.cells()];
             let domain = Domain::new(grid, &cells, [CLOSED, CLOSED, [floor, Boundary::Closed]]).unwrap();
-            let transport = Transport::new(domain.clone(), 0.5, &Flow::still(&domain), 0.0, Scheme::default()).unwrap();
+            let transport =
+                Transport::new(domain.clone(), 0.5, &Flow::still(&domain), 0.0, FluxRule::default()).unwrap();
             let block = |corner: [f64; 3]| domain.block(corner, corner.map(|x| x + 0.4)).unwrap();
-            let release = Release {
+            let release = TimedSource {
                 patch: block(source),
                 rate: 1.0,
                 start: 0.0,

@@ -1,7 +1,8 @@
 //! `SensorField` as a model of an estimator: the laws of `SourceModel`.
 
 use fewbits_diffusion::{
-    Domain, Flow, Plan, PotentialFlow, Release, Scheme, SensorField, Source, Steady, StepControl, Transient, Transport,
+    Domain, Flow, FluxRule, Plan, PotentialFlow, SensorField, Source, Steady, StepControl, TimedSource, Transient,
+    Transport,
 };
 use fewbits_models::{Receptor, SourceModel};
 use nalgebra::Vector3;
@@ -19,7 +20,7 @@ fn domain() -> Domain {
 fn transport() -> Transport {
     let domain = domain();
     let wind = PotentialFlow::new(&domain, 0.05).unwrap().flow;
-    Transport::new(domain, 0.04, &wind, 0.0, Scheme::default()).unwrap()
+    Transport::new(domain, 0.04, &wind, 0.0, FluxRule::default()).unwrap()
 }
 
 fn fields() -> [SensorField; 2] {
@@ -57,7 +58,7 @@ fn response_at_a_centre_is_the_forward_concentration() {
         rate,
     };
     let forward = steady.concentration(&[source]).unwrap();
-    let release = Release {
+    let release = TimedSource {
         patch,
         rate,
         start: 0.0,
@@ -175,6 +176,6 @@ fn receptors_are_sensors_only() {
     assert!(SensorField::steady(&transport, &[[2.2, 0.4, 0.0]]).is_err());
     assert!(SensorField::transient(&transport, &SENSORS, &[2.0, 1.0], StepControl::default()).is_err());
     let closed = Plan::parse("...").unwrap().domain(1.0, 1, 0.0).unwrap();
-    let closed = Transport::new(closed.clone(), 1.0, &Flow::still(&closed), 0.0, Scheme::default()).unwrap();
+    let closed = Transport::new(closed.clone(), 1.0, &Flow::still(&closed), 0.0, FluxRule::default()).unwrap();
     assert!(SensorField::steady(&closed, &[[0.5, 0.5, 0.0]]).is_err());
 }

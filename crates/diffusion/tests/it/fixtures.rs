@@ -1,10 +1,10 @@
 //! Reference values by finite elements and series (`fixtures/geometry.json`): tolerances, orders, extrapolated values.
 
 use crate::cases::{Model, errors, fixture};
-use fewbits_diffusion::{Method, Release, Scheme, StepControl, Transient};
+use fewbits_diffusion::{FluxRule, Method, StepControl, TimedSource, Transient};
 use serde_json::Value;
 
-const SCHEMES: [(Scheme, &str); 2] = [(Scheme::ExponentialFitting, "exp"), (Scheme::Upwind, "upwind")];
+const SCHEMES: [(FluxRule, &str); 2] = [(FluxRule::ExponentialFitting, "exp"), (FluxRule::Upwind, "upwind")];
 
 fn largest(errors: &[f64]) -> f64 {
     errors.iter().copied().fold(0.0, f64::max)
@@ -12,7 +12,7 @@ fn largest(errors: &[f64]) -> f64 {
 
 /// Checks every entry of the cases that begin so, at squares split by 1, 2, (4): tolerances at each, and for the exponential scheme the
 /// order between the last two and the extrapolated values.
-fn check(cases: &[&str], splits: &[usize], schemes: &[(Scheme, &str)]) {
+fn check(cases: &[&str], splits: &[usize], schemes: &[(FluxRule, &str)]) {
     let all = fixture();
     for (scheme, scheme_name) in schemes {
         for case in cases {
@@ -24,7 +24,7 @@ fn check(cases: &[&str], splits: &[usize], schemes: &[(Scheme, &str)]) {
             let entries: Vec<&Value> = entries
                 .filter(|e| e["case"] == **case && !e["tolerance"][*scheme_name].is_null())
                 .collect();
-            assert!(!entries.is_empty() || *scheme == Scheme::Upwind, "no entry of {case}");
+            assert!(!entries.is_empty() || *scheme == FluxRule::Upwind, "no entry of {case}");
             for entry in entries {
                 let values: Vec<Vec<f64>> = models.iter().map(|model| model.values(entry)).collect();
                 let found: Vec<f64> = values.iter().map(|values| largest(&errors(entry, values))).collect();
@@ -58,7 +58,7 @@ fn check_limit(entry: &Value, scheme_name: &str, values: &[Vec<f64>], found: &[f
     let error = largest(&errors(entry, &extrapolated));
     let tolerance = entry["extrapolated"]["tolerance"].as_f64().unwrap();
     assert!(error <= tolerance, "{} extrapolated: {error}, expected {tolerance}", entry["id"]);
-    // A budget of decay alone is exact: it has no order.
+    // A balance of decay alone is exact: it has no order.
     let seen = (found[found.len() - 2] / found[found.len() - 1]).log2();
     let stated = entry["order"]["exp"][1].as_f64().unwrap();
     if found[found.len() - 1] > 1e-8 {
@@ -142,8 +142,8 @@ fn fine_grids_meet_references() {
 #[test]
 fn sharper_time_steps_change_little() {
     let all = fixture();
-    let model = Model::new(&all, "plan1-wind", 1, Scheme::ExponentialFitting);
-    let release = |stop| Release {
+    let model = Model::new(&all, "plan1-wind", 1, FluxRule::ExponentialFitting);
+    let release = |stop| TimedSource {
         patch: model.square(&serde_json::json!([6, 6])),
         rate: 1.0,
         start: 0.0,

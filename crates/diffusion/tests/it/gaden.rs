@@ -1,7 +1,7 @@
 //! Rooms and tables of the simulator GADEN: what is read is what was written, and any text is a room, a table or an error.
 
 use fewbits_diffusion::gaden::{Room, Table};
-use fewbits_diffusion::{Boundary, Cell, Domain, Grid, Scheme, Source, Steady, Transport};
+use fewbits_diffusion::{Boundary, CellKind, Domain, FluxRule, Grid, Source, Steady, Transport};
 use proptest::prelude::*;
 
 /// A room of 6 x 4 x 2 cells of 0.5 m whose lowest corner is (-1, 2, 0): a wall, and outlets at both ends in x.
@@ -31,11 +31,11 @@ fn room_text() -> String {
 fn by_hand() -> Domain {
     let grid = Grid::uniform(&[6, 4, 2], 0.5).unwrap();
     let cell = |i| match kind(grid.place(i)) {
-        1 => Cell::Blocked(Boundary::Closed),
-        2 => Cell::Open(Boundary::Outflow),
-        _ => Cell::Free,
+        1 => CellKind::Blocked(Boundary::Closed),
+        2 => CellKind::Open(Boundary::Outflow),
+        _ => CellKind::Free,
     };
-    let cells: Vec<Cell> = (0..grid.cells()).map(cell).collect();
+    let cells: Vec<CellKind> = (0..grid.cells()).map(cell).collect();
     Domain::new(grid, &cells, [[Boundary::Closed; 2]; 3]).unwrap()
 }
 
@@ -119,7 +119,7 @@ fn averages_are_the_means_of_what_was_written() {
     let (room, domain) = (Room::parse(&room_text()).unwrap(), by_hand());
     let still = fewbits_diffusion::Flow::still(&domain);
     let source = domain.point([0.9, 0.6, 0.3]).unwrap();
-    let transport = Transport::new(domain.clone(), 0.1, &still, 0.0, Scheme::default()).unwrap();
+    let transport = Transport::new(domain.clone(), 0.1, &still, 0.0, FluxRule::default()).unwrap();
     let concentration = Steady::new(&transport)
         .unwrap()
         .concentration(&[Source {
@@ -153,7 +153,7 @@ fn an_outlet_within_walls_lets_the_gas_out() {
         .unwrap();
     assert_eq!(domain.free().len(), 2);
     let still = fewbits_diffusion::Flow::still(&domain);
-    let transport = Transport::new(domain.clone(), 0.1, &still, 0.0, Scheme::default()).unwrap();
+    let transport = Transport::new(domain.clone(), 0.1, &still, 0.0, FluxRule::default()).unwrap();
     let patch = domain.point([0.75; 3]).unwrap();
     let steady = Steady::new(&transport).unwrap();
     let concentration = steady.concentration(&[Source { patch, rate: 1.0 }]).unwrap();

@@ -2,12 +2,12 @@
 
 use crate::cases::{Model, fixture, plan};
 use fewbits_diffusion::{
-    Boundary, Cell, Divergence, Domain, Error, Flow, Grid, Method, Plan, PotentialFlow, Release, Scheme, Source,
-    Steady, StepControl, Transient, Transport,
+    Boundary, CellKind, Divergence, Domain, Error, Flow, FluxRule, Grid, Method, Plan, PotentialFlow, Source, Steady,
+    StepControl, TimedSource, Transient, Transport,
 };
 use serde_json::json;
 
-const SCHEMES: [Scheme; 2] = [Scheme::ExponentialFitting, Scheme::Upwind];
+const SCHEMES: [FluxRule; 2] = [FluxRule::ExponentialFitting, FluxRule::Upwind];
 
 fn plan1(split: usize) -> Domain {
     plan(&fixture(), "plan1").domain(0.25, split, 0.0).unwrap()
@@ -20,7 +20,7 @@ fn one(count: usize, at: usize) -> Vec<f64> {
 }
 
 /// A wind of any strength along the plan: the potential flow times a factor is one too.
-fn windy(domain: &Domain, total: f64, diffusivity: f64, scheme: Scheme) -> Transport {
+fn windy(domain: &Domain, total: f64, diffusivity: f64, scheme: FluxRule) -> Transport {
     let wind = PotentialFlow::new(domain, total).unwrap().flow;
     Transport::new(domain.clone(), diffusivity, &wind, 0.0, scheme).unwrap()
 }
@@ -38,7 +38,7 @@ fn columns_sum_to_what_leaves() {
             let count = domain.free().len();
             for k in 0..count {
                 let column = transport.net_outflow(&one(count, k)).unwrap();
-                let leaves = transport.budget(&one(count, k)).unwrap().removed();
+                let leaves = transport.balance(&one(count, k)).unwrap().removed();
                 assert!((column.iter().sum::<f64>() - leaves).abs() <= 1e-13 * column[k], "{scheme:?} {total} {k}");
                 assert!(column.iter().enumerate().all(|(i, a)| i == k || *a <= 0.0) && leaves >= 0.0);
             }
@@ -60,8 +60,8 @@ fn steady_budget_closes_at_any_peclet_number() {
                 .unwrap()
                 .concentration(std::slice::from_ref(&source))
                 .unwrap();
-            let budget = transport.budget(&field).unwrap();
-            assert!((budget.removed() - 1.0).abs() < 1e-10, "{scheme:?} {total}: {budget:?}");
+            let balance = transport.balance(&field).unwrap();
+            assert!((balance.removed() - 1.0).abs() < 1e-10, "{scheme:?} {total}: {balance:?}");
             assert!(field.iter().all(|c| *c >= 0.0), "{scheme:?} {total}: negative");
         }
     }
@@ -90,7 +90,7 @@ fn still_air_is_reciprocal() {
     let domain = plan(&fixture(), "room_window").domain(0.25, 2, 0.0).unwrap();
     let diffusivity = domain.sample(|[x, y, _]| 0.02 + 0.01 * x + 0.005 * y * y);
     let transport =
-        Transport::new(domain.clone(), diffusivity, &Flow::still(&domain), 1e-4, Scheme::default()).unwrap();
+        Transport::new(domain.clone(), diffusivity, &Flow::still(&domain), 1e-4, FluxRule::default()).unwrap();
     assert!(transport.is_symmetric().unwrap());
     let steady = Steady::new(&transport).unwrap();
     let (a, b) = (domain.locate([1.1, 1.3, 0.0]).unwrap(), domain.locate([5.0, 4.4, 0.0]).unwrap());
@@ -104,7 +104,7 @@ fn still_air_is_reciprocal() {
 fn potential_flow_has_a_symmetric_green_function() {
     let domain = plan1(1);
     let wind = PotentialFlow::new(&domain, 0.15).unwrap();
-    let transport = Transport::new(domain.clone(), 0.05, &wind.flow, 0.0, Scheme::default()).unwrap();
+    let transport = Transport::new(domain.clone(), 0.05, &wind.flow, 0.0, FluxRule::default()).unwrap();
     assert!(transport.is_symmetric().unwrap());
     let steady = Steady::new(&transport).unwrap();
     let count = domain.free().len();
@@ -124,7 +124,7 @@ fn potential_flow_has_a_symmetric_green_function() {
 #[test]
 fn steady_adjoint_equals_forward() {
     let domain = plan1(1);
-    for (scheme, symmetric) in [(Scheme::ExponentialFitting, true), (Scheme::Upwind, false)] {
+    for (scheme, symmetric) in [(FluxRule::ExponentialFitting, true), (FluxRule::Upwind, false)] {
         let transport = windy(&domain, 0.3, 0.02, scheme);
         assert_eq!(transport.is_symmetric().unwrap(), symmetric);
         let steady = Steady::new(&transport).unwrap();
@@ -150,7 +150,7 @@ fn steady_adjoint_equals_forward() {
 fn adjoint_in_time_equals_forward() {
     let domain = plan1(1);
     for method in [Method::TrBdf2, Method::ImplicitEuler] {
-        let transport = windy(&domain, 0.15, 0.05, Scheme::Upwind);
+        let transport = windy(&domain, 0.15, 0.05, FluxRule::Upwind);
         let solver = || {
             Transient::new(&transport)
                 .with_method(method)
@@ -158,7 +158,7 @@ fn adjoint_in_time_equals_forward() {
                 .unwrap()
         };
         let (source, sensor) = (domain.point([1.6, 1.6, 0.0]).unwrap(), domain.point([4.1, 2.8, 0.0]).unwrap());
-        let release = Release {
+        let release = TimedSource {
             patch: source.clone(),
             rate: 2.0,
             start: 0.0,
@@ -188,9 +188,9 @@ fn adjoint_in_time_equals_forward() {
 #[test]
 fn adaptive_step_response_agrees_with_release() {
     let domain = plan1(1);
-    let transport = windy(&domain, 0.15, 0.05, Scheme::default());
+    let transport = windy(&domain, 0.15, 0.05, FluxRule::default());
     let (source, sensor) = (domain.point([1.6, 1.6, 0.0]).unwrap(), domain.point([4.1, 2.8, 0.0]).unwrap());
-    let release = Release {
+    let release = TimedSource {
         patch: source.clone(),
         rate: 2.0,
         start: 15.0,
@@ -211,13 +211,13 @@ fn adaptive_step_response_agrees_with_release() {
 fn mass_in_time_is_released_less_left() {
     let domain = plan1(1);
     for method in [Method::TrBdf2, Method::ImplicitEuler] {
-        let transport = windy(&domain, 0.3, 0.05, Scheme::default());
+        let transport = windy(&domain, 0.3, 0.05, FluxRule::default());
         let tolerance = if method == Method::TrBdf2 { 1e-5 } else { 1e-2 };
         let mut solver = Transient::new(&transport)
             .with_method(method)
             .with_control(StepControl::Tolerance(tolerance))
             .unwrap();
-        let release = Release {
+        let release = TimedSource {
             patch: domain.point([1.6, 1.6, 0.0]).unwrap(),
             rate: 1.0,
             start: 7.0,
@@ -227,8 +227,8 @@ fn mass_in_time_is_released_less_left() {
             .run(&vec![0.0; domain.free().len()], &[release], &[5.0, 40.0, 300.0])
             .unwrap()
         {
-            let mass = transport.budget(&snapshot.concentration).unwrap().mass;
-            let left = transport.budget(&snapshot.dose).unwrap().removed();
+            let mass = transport.balance(&snapshot.concentration).unwrap().mass;
+            let left = transport.balance(&snapshot.dose).unwrap().removed();
             let released = (snapshot.time.min(60.0) - 7.0).max(0.0);
             assert!((mass + left - released).abs() < 1e-10 * 53.0, "{method:?} {}: {mass} {left}", snapshot.time);
         }
@@ -238,13 +238,13 @@ fn mass_in_time_is_released_less_left() {
 #[test]
 fn closed_room_holds_rate_over_decay() {
     let domain = plan(&fixture(), "room").domain(0.25, 1, 0.0).unwrap();
-    let transport = Transport::new(domain.clone(), 0.05, &Flow::still(&domain), 1e-3, Scheme::default()).unwrap();
+    let transport = Transport::new(domain.clone(), 0.05, &Flow::still(&domain), 1e-3, FluxRule::default()).unwrap();
     let source = Source {
         patch: domain.point([1.1, 3.1, 0.0]).unwrap(),
         rate: 0.7,
     };
     let field = Steady::new(&transport).unwrap().concentration(&[source]).unwrap();
-    assert!((transport.budget(&field).unwrap().mass / 700.0 - 1.0).abs() < 1e-10);
+    assert!((transport.balance(&field).unwrap().mass / 700.0 - 1.0).abs() < 1e-10);
 }
 
 /// Diffusivity, wind and decay times `a` divide time, and steady concentrations, by `a`; a length times `a` is only another unit.
@@ -254,7 +254,7 @@ fn nothing_depends_on_the_unit() {
         let domain = plan(&fixture(), "plan1").domain(0.25 * length, 1, 0.0).unwrap();
         let area = length * length / time;
         let wind = PotentialFlow::new(&domain, 0.15 * area).unwrap().flow;
-        let transport = Transport::new(domain.clone(), 0.05 * area, &wind, 1e-4 / time, Scheme::default()).unwrap();
+        let transport = Transport::new(domain.clone(), 0.05 * area, &wind, 1e-4 / time, FluxRule::default()).unwrap();
         let patch = domain.point([1.6 * length, 1.6 * length, 0.0]).unwrap();
         let at = domain.point([4.1 * length, 2.8 * length, 0.0]).unwrap();
         let field = Steady::new(&transport)
@@ -264,7 +264,7 @@ fn nothing_depends_on_the_unit() {
                 rate: 1.0,
             }])
             .unwrap();
-        let release = Release {
+        let release = TimedSource {
             patch,
             rate: 1.0,
             start: 0.0,
@@ -308,7 +308,7 @@ fn projected_wind_keeps_uniform() {
         .for_each(|(i, v)| v[0] *= 1.0 + 0.05 * (i as f64).sin());
     assert!(matches!(Flow::from_cells(&domain, &measured, Divergence::Refuse), Err(Error::Divergence { .. })));
     let projected = Flow::from_cells(&domain, &measured, Divergence::Project).unwrap();
-    let transport = Transport::new(domain.clone(), 0.05, &projected, 0.0, Scheme::default()).unwrap();
+    let transport = Transport::new(domain.clone(), 0.05, &projected, 0.0, FluxRule::default()).unwrap();
     assert!(!transport.is_symmetric().unwrap());
     let field = Steady::new(&transport)
         .unwrap()
@@ -327,7 +327,7 @@ fn falling_wind_never_makes_mass() {
         [Boundary::Closed; 2],
         [Boundary::Closed; 2],
     ];
-    let domain = Domain::new(grid, &[Cell::Free; 10], ends).unwrap();
+    let domain = Domain::new(grid, &[CellKind::Free; 10], ends).unwrap();
     for speed in [-2.2, -2.0, -40.0] {
         let wind = Flow::from_velocity(&domain, |_| [speed, 0.0, 0.0], Divergence::Refuse).unwrap();
         for scheme in SCHEMES {
@@ -338,7 +338,7 @@ fn falling_wind_never_makes_mass() {
             solver = solver.with_control(StepControl::Tolerance(1e-2)).unwrap();
             let mut before = 1.0;
             for snapshot in solver.run(&initial, &[], &[1.0, 3.0, 10.0]).unwrap() {
-                let mass = transport.budget(&snapshot.concentration).unwrap().mass;
+                let mass = transport.balance(&snapshot.concentration).unwrap().mass;
                 assert!(
                     snapshot.lowest == 0.0 && mass <= before + 1e-12,
                     "{speed} {scheme:?} {}: {mass}",
@@ -351,7 +351,7 @@ fn falling_wind_never_makes_mass() {
     // The floor that leaks (.1 m/s) and the wall that closes: no wind passes them, so such a wind is refused.
     for floor in [Boundary::Leaking(0.1), Boundary::Closed] {
         let sides = [[floor, Boundary::Closed], [Boundary::Closed; 2], [Boundary::Closed; 2]];
-        let column = Domain::new(Grid::uniform(&[10], 1.0).unwrap(), &[Cell::Free; 10], sides).unwrap();
+        let column = Domain::new(Grid::uniform(&[10], 1.0).unwrap(), &[CellKind::Free; 10], sides).unwrap();
         let refused = Flow::from_velocity(&column, |_| [-2.2, 0.0, 0.0], Divergence::Refuse);
         assert!(matches!(refused, Err(Error::Divergence { .. })), "{refused:?}");
         // Projected, nothing blows.
@@ -370,7 +370,7 @@ fn layers_in_series_are_exact() {
         [Boundary::Closed; 2],
         [Boundary::Closed; 2],
     ];
-    let domain = Domain::new(grid, &[Cell::Free; 6], sides).unwrap();
+    let domain = Domain::new(grid, &[CellKind::Free; 6], sides).unwrap();
     let diffusivity = domain.sample(|[x, ..]| {
         if x < 0.4 {
             0.3
@@ -380,7 +380,8 @@ fn layers_in_series_are_exact() {
             0.05
         }
     });
-    let transport = Transport::new(domain.clone(), diffusivity, &Flow::still(&domain), 0.0, Scheme::default()).unwrap();
+    let transport =
+        Transport::new(domain.clone(), diffusivity, &Flow::still(&domain), 0.0, FluxRule::default()).unwrap();
     let field = Steady::new(&transport)
         .unwrap()
         .from_amounts(&[0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -402,9 +403,8 @@ fn layers_in_series_are_exact() {
 #[test]
 fn diagonal_contact_is_no_passage() {
     let domain = Plan::parse("..#\n..#\n##.").unwrap().domain(0.5, 1, 0.0).unwrap();
-    assert_eq!(domain.parts().1, 2);
-    let transport = Transport::new(domain.clone(), 0.05, &Flow::still(&domain), 0.0, Scheme::default()).unwrap();
-    let release = Release {
+    let transport = Transport::new(domain.clone(), 0.05, &Flow::still(&domain), 0.0, FluxRule::default()).unwrap();
+    let release = TimedSource {
         patch: domain.point([0.2, 0.2, 0.0]).unwrap(),
         rate: 1.0,
         start: 0.0,
@@ -412,7 +412,7 @@ fn diagonal_contact_is_no_passage() {
     };
     let run = Transient::new(&transport).run(&[0.0; 5], &[release], &[20.0]).unwrap();
     assert_eq!(run[0].concentration[4], 0.0);
-    assert!((transport.budget(&run[0].concentration).unwrap().mass - 5.0).abs() < 1e-12);
+    assert!((transport.balance(&run[0].concentration).unwrap().mass - 5.0).abs() < 1e-12);
     // Without any exit there is no steady state.
     assert!(matches!(Steady::new(&transport).err(), Some(Error::NoSink { cell: [0, 0, 0] })));
 }
@@ -434,7 +434,7 @@ fn part_without_opening_has_no_wind() {
 /// Means over a patch, as sources and as sensors, come from the same shares.
 #[test]
 fn square_of_the_fixture_has_mean_one() {
-    let model = Model::new(&fixture(), "room-decay", 2, Scheme::default());
+    let model = Model::new(&fixture(), "room-decay", 2, FluxRule::default());
     let ones = vec![1.0; model.transport.domain().free().len()];
     assert!((model.square(&json!([4, 12])).mean(&ones) - 1.0).abs() < 1e-14);
 }

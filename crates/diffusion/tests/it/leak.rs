@@ -1,6 +1,6 @@
 //! A leak in rooms, from readings of a few bits at irregular times. The truth has cells of half the width, another diffusivity and other gains.
 
-use fewbits_diffusion::{Flow, LeakBelief, LeakPrior, Plan, Reading, Scheme, SensorField, StepControl, Transport};
+use fewbits_diffusion::{Flow, FluxRule, LeakBelief, LeakPrior, Plan, Reading, SensorField, StepControl, Transport};
 use fewbits_numerics::normal::{cdf, quantile};
 
 const PLAN: &str = "
@@ -49,7 +49,7 @@ impl Draws {
 fn field(split: usize, diffusivity: f64) -> (SensorField, Transport) {
     let domain = Plan::parse(PLAN).unwrap().domain(0.5, split, 0.0).unwrap();
     let still = Flow::still(&domain);
-    let transport = Transport::new(domain, diffusivity, &still, 1e-3, Scheme::default()).unwrap();
+    let transport = Transport::new(domain, diffusivity, &still, 1e-3, FluxRule::default()).unwrap();
     (
         SensorField::transient(&transport, &SENSORS, &AGES, StepControl::Tolerance(1e-3)).unwrap(),
         transport,
@@ -266,7 +266,7 @@ fn many_accurate_values_do_not_name_one_rate_of_the_grid() {
         .domain(1.0, 1, 0.0)
         .unwrap();
     let still = Flow::still(&domain);
-    let transport = Transport::new(domain, 0.02, &still, 1e-3, Scheme::default()).unwrap();
+    let transport = Transport::new(domain, 0.02, &still, 1e-3, FluxRule::default()).unwrap();
     let at = [[1.5, 1.5, 0.0]];
     let field = SensorField::transient(&transport, &at, &[1000.0], StepControl::Tolerance(1e-3)).unwrap();
     let (response, step) = (field.response(0, 0).unwrap()[0], f64::ln(100.0) / 24.0);
@@ -324,7 +324,7 @@ fn words_tell_the_rate_as_a_finer_sum_does() {
         .domain(1.0, 1, 0.0)
         .unwrap();
     let still = Flow::still(&domain);
-    let transport = Transport::new(domain, 0.02, &still, 1e-3, Scheme::default()).unwrap();
+    let transport = Transport::new(domain, 0.02, &still, 1e-3, FluxRule::default()).unwrap();
     let field = SensorField::transient(&transport, &[[1.5, 1.5, 0.0]], &AGES, StepControl::Tolerance(1e-3)).unwrap();
     let prior = LeakPrior {
         start: [0.0, 7200.0],

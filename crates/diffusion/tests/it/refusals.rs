@@ -1,8 +1,8 @@
 //! What is refused, and with which words.
 
 use fewbits_diffusion::{
-    Boundary, Cell, Divergence, Domain, Error, Flow, Grid, Plan, PotentialFlow, Release, Scheme, Source, Steady,
-    StepControl, Transient, Transport,
+    Boundary, CellKind, Divergence, Domain, Error, Flow, FluxRule, Grid, Plan, PotentialFlow, Source, Steady,
+    StepControl, TimedSource, Transient, Transport,
 };
 
 const CLOSED: [[Boundary; 2]; 3] = [[Boundary::Closed; 2]; 3];
@@ -24,20 +24,24 @@ fn grids_are_checked() {
     );
     assert!(Grid::new(&[vec![0.0, f64::NAN]]).is_err());
     let grid = Grid::new(&[vec![0.0, 0.1, 0.4], vec![-1.0, 2.0]]).unwrap();
-    assert_eq!(grid.cell_at([0.1, 0.0, 99.0]), Some(1));
-    assert_eq!(grid.cell_at([0.4, 2.0, 0.0]), Some(1));
-    assert_eq!(grid.cell_at([0.41, 0.0, 0.0]), None);
+    let domain = Domain::new(grid, &[CellKind::Free; 2], [[Boundary::Closed; 2]; 3]).unwrap();
+    assert_eq!(domain.locate([0.1, 0.0, 99.0]), Ok(1));
+    assert_eq!(domain.locate([0.4, 2.0, 0.0]), Ok(1));
+    assert!(domain.locate([0.41, 0.0, 0.0]).is_err());
 }
 
 #[test]
 fn domains_are_checked() {
     let grid = || Grid::uniform(&[2, 1], 1.0).unwrap();
-    assert!(Domain::new(grid(), &[Cell::Free], CLOSED).is_err());
-    assert_eq!(Domain::new(grid(), &[Cell::Blocked(Boundary::Closed); 2], CLOSED).unwrap_err(), Error::NoFreeCell);
+    assert!(Domain::new(grid(), &[CellKind::Free], CLOSED).is_err());
+    assert_eq!(
+        Domain::new(grid(), &[CellKind::Blocked(Boundary::Closed); 2], CLOSED).unwrap_err(),
+        Error::NoFreeCell
+    );
     for leak in [-1.0, f64::NAN, f64::INFINITY] {
-        assert!(Domain::new(grid(), &[Cell::Free, Cell::Blocked(Boundary::Leaking(leak))], CLOSED).is_err());
+        assert!(Domain::new(grid(), &[CellKind::Free, CellKind::Blocked(Boundary::Leaking(leak))], CLOSED).is_err());
     }
-    let leaking = Domain::new(grid(), &[Cell::Free, Cell::Blocked(Boundary::Leaking(0.1))], CLOSED).unwrap();
+    let leaking = Domain::new(grid(), &[CellKind::Free, CellKind::Blocked(Boundary::Leaking(0.1))], CLOSED).unwrap();
     assert!(leaking.with_wall_normals(|_| [2.0, 0.0, 0.0]).is_err());
 }
 
@@ -89,10 +93,10 @@ fn winds_are_checked() {
     // A wind against the openings.
     let duct = Plan::parse("I..O").unwrap().domain(1.0, 1, 0.0).unwrap();
     let against = Flow::from_velocity(&duct, |_| [-1.0, 0.0, 0.0], Divergence::Refuse).unwrap();
-    let refused = Transport::new(duct.clone(), 0.1, &against, 0.0, Scheme::default()).err();
+    let refused = Transport::new(duct.clone(), 0.1, &against, 0.0, FluxRule::default()).err();
     assert!(matches!(refused, Some(Error::Backflow { cell: [3, 0, 0], .. })), "{refused:?}");
     // A flow of another domain.
-    assert!(Transport::new(room, 0.1, &against, 0.0, Scheme::default()).is_err());
+    assert!(Transport::new(room, 0.1, &against, 0.0, FluxRule::default()).is_err());
 }
 
 #[test]
@@ -101,7 +105,7 @@ fn media_are_checked() {
     let still = Flow::still(&room);
     let count = room.free().len();
     let transport = |diffusivity: Vec<f64>, decay: Vec<f64>| {
-        Transport::new(room.clone(), diffusivity, &still, decay, Scheme::default())
+        Transport::new(room.clone(), diffusivity, &still, decay, FluxRule::default())
     };
     assert!(transport(vec![0.1; count], vec![0.0; count]).is_ok());
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
@@ -115,11 +119,11 @@ fn media_are_checked() {
 fn part_without_sink_is_named() {
     let domain = Plan::parse("I.O##\n###.#").unwrap().domain(1.0, 1, 0.0).unwrap();
     let transport =
-        |decay: f64| Transport::new(domain.clone(), 0.1, &Flow::still(&domain), decay, Scheme::default()).unwrap();
+        |decay: f64| Transport::new(domain.clone(), 0.1, &Flow::still(&domain), decay, FluxRule::default()).unwrap();
     assert_eq!(Steady::new(&transport(0.0)).err(), Some(Error::NoSink { cell: [3, 1, 0] }));
     assert!(Steady::new(&transport(1e-3)).is_ok());
     // In time it is well posed.
-    let release = Release {
+    let release = TimedSource {
         patch: domain.point([3.5, 1.5, 0.0]).unwrap(),
         rate: 1.0,
         start: 0.0,
@@ -134,9 +138,9 @@ fn part_without_sink_is_named() {
 #[test]
 fn runs_are_checked() {
     let room = room();
-    let transport = Transport::new(room.clone(), 0.1, &Flow::still(&room), 0.0, Scheme::default()).unwrap();
+    let transport = Transport::new(room.clone(), 0.1, &Flow::still(&room), 0.0, FluxRule::default()).unwrap();
     let count = room.free().len();
-    let release = |rate, start, stop| Release {
+    let release = |rate, start, stop| TimedSource {
         patch: room.point([0.7, 0.7, 0.0]).unwrap(),
         rate,
         start,
@@ -167,7 +171,7 @@ fn runs_are_checked() {
             .is_err()
     );
     assert!(Transient::new(&transport).with_control(StepControl::Equal(0)).is_err());
-    let other = Domain::new(Grid::uniform(&[40], 1.0).unwrap(), &[Cell::Free; 40], CLOSED).unwrap();
+    let other = Domain::new(Grid::uniform(&[40], 1.0).unwrap(), &[CellKind::Free; 40], CLOSED).unwrap();
     let foreign = other.point([39.5, 0.0, 0.0]).unwrap();
     assert!(Steady::new(&transport).unwrap().adjoint(&[foreign]).is_err());
     assert!(Steady::new(&transport).unwrap().from_amounts(&[1.0]).is_err());
@@ -181,11 +185,11 @@ fn numbers_beyond_the_range_are_refused() {
     let room = room();
     let still = Flow::still(&room);
     for (diffusivity, decay) in [(1e31, 0.0), (1e-31, 0.0), (1.0, 1e31)] {
-        assert!(Transport::new(room.clone(), diffusivity, &still, decay, Scheme::default()).is_err());
+        assert!(Transport::new(room.clone(), diffusivity, &still, decay, FluxRule::default()).is_err());
     }
     assert!(PotentialFlow::new(&room, 1e91).is_err());
     assert!(Flow::from_velocity(&room, |_| [1e300, 0.0, 0.0], Divergence::Project).is_err());
-    let transport = Transport::new(room.clone(), 1e-30, &still, 0.0, Scheme::default()).unwrap();
+    let transport = Transport::new(room.clone(), 1e-30, &still, 0.0, FluxRule::default()).unwrap();
     let patch = room.point([0.7, 0.7, 0.0]).unwrap();
     let strongest = Source {
         patch: patch.clone(),
@@ -193,7 +197,7 @@ fn numbers_beyond_the_range_are_refused() {
     };
     assert!(Steady::new(&transport).unwrap().concentration(&[strongest]).is_err());
     let mut transient = Transient::new(&transport).with_control(StepControl::Equal(2)).unwrap();
-    let release = Release {
+    let release = TimedSource {
         patch,
         rate: f64::MAX,
         start: 0.0,

@@ -1,8 +1,8 @@
 //! Wild arguments: grids, flows, transports and fields are numbers, or refused.
 
 use fewbits_diffusion::{
-    Boundary, Cell, Divergence, Domain, Flow, Grid, Plan, PotentialFlow, Release, Scheme, SensorField, Source, Steady,
-    StepControl, Transient, Transport,
+    Boundary, CellKind, Divergence, Domain, Flow, FluxRule, Grid, Plan, PotentialFlow, SensorField, Source, Steady,
+    StepControl, TimedSource, Transient, Transport,
 };
 use fewbits_models::SourceModel;
 use fewbits_models::nalgebra::Vector3;
@@ -41,11 +41,11 @@ fn domain(x: &[f64], which: [u8; 6]) -> Option<Domain> {
     .into_iter()
     .flatten()
     .next()?;
-    let cells: Vec<Cell> = (0..grid.cells())
+    let cells: Vec<CellKind> = (0..grid.cells())
         .map(|i| match which[i % 6] % 4 {
-            0 => Cell::Blocked(boundary(which[i % 6] / 4, x[5])),
-            1 => Cell::Open(boundary(which[i % 6] / 4, x[5])),
-            _ => Cell::Free,
+            0 => CellKind::Blocked(boundary(which[i % 6] / 4, x[5])),
+            1 => CellKind::Open(boundary(which[i % 6] / 4, x[5])),
+            _ => CellKind::Free,
         })
         .collect();
     Domain::new(grid, &cells, [0, 1, 2].map(|i| [boundary(which[i], x[6]), boundary(which[i + 3], x[7])])).ok()
@@ -65,7 +65,7 @@ proptest! {
             PotentialFlow::new(&domain, x[10]).map(|potential| potential.flow),
         ];
         for flow in flows.into_iter().flatten() {
-            for scheme in [Scheme::ExponentialFitting, Scheme::Upwind] {
+            for scheme in [FluxRule::ExponentialFitting, FluxRule::Upwind] {
                 let Ok(transport) = Transport::new(domain.clone(), x[11], &flow, x[12], scheme) else { continue };
                 let point = domain.grid().centre(domain.free()[0]);
                 let Ok(patch) = domain.point(point) else { continue };
@@ -73,8 +73,8 @@ proptest! {
                     && let Ok(field) = steady.concentration(&[Source { patch: patch.clone(), rate: x[13] }])
                 {
                     prop_assert!(finite(&field) && (x[13] < 0.0 || field.iter().all(|c| *c >= 0.0)), "{:?} {:?}: {:?}", domain, x, field);
-                    if let Ok(budget) = transport.budget(&field) {
-                        prop_assert!(!budget.mass.is_nan() && !budget.removed().is_nan(), "{:?}", budget);
+                    if let Ok(balance) = transport.balance(&field) {
+                        prop_assert!(!balance.mass.is_nan() && !balance.removed().is_nan(), "{:?}", balance);
                     }
                 }
                 if let Ok(field) = SensorField::steady(&transport, &[point]) {
@@ -97,10 +97,10 @@ proptest! {
         let domain = Plan::parse("I.#\n..O").unwrap().domain(0.5, 1, 0.0).unwrap();
         let Ok(wind) = PotentialFlow::new(&domain, x[0]) else { return Ok(()) };
         let patch = domain.point([0.2, 0.2, 0.0]).unwrap();
-        let Ok(transport) = Transport::new(domain, x[1], &wind.flow, x[2], Scheme::default()) else { return Ok(()) };
+        let Ok(transport) = Transport::new(domain, x[1], &wind.flow, x[2], FluxRule::default()) else { return Ok(()) };
         for control in [StepControl::Equal(steps), StepControl::Tolerance(x[3].max(1e-3))] {
             let Ok(mut transient) = Transient::new(&transport).with_control(control) else { continue };
-            let release = Release { patch: patch.clone(), rate: x[4], start: x[5], stop: x[6] };
+            let release = TimedSource { patch: patch.clone(), rate: x[4], start: x[5], stop: x[6] };
             if let Ok(snapshots) = transient.run(&[0.0; 5], &[release], &[x[7]]) {
                 prop_assert!(snapshots.iter().all(|s| finite(&s.concentration) && finite(&s.dose)), "{:?} {:?}", x, snapshots);
             }
@@ -125,8 +125,8 @@ fn release_just_before_a_reading_ends() {
     let domain = Plan::parse("I.#\n..O").unwrap().domain(0.5, 1, 0.0).unwrap();
     let flow = PotentialFlow::new(&domain, 1.0).unwrap().flow;
     let patch = domain.point([0.2, 0.2, 0.0]).unwrap();
-    let transport = Transport::new(domain, 1.0, &flow, 0.0, Scheme::default()).unwrap();
-    let release = |start| Release {
+    let transport = Transport::new(domain, 1.0, &flow, 0.0, FluxRule::default()).unwrap();
+    let release = |start| TimedSource {
         patch: patch.clone(),
         rate: 1.0,
         start,

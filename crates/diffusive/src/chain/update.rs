@@ -3,7 +3,7 @@
 use super::Search;
 use super::alternatives::{Alternative, EXCLUDED};
 use super::outcome::{Status, failure};
-use crate::belief::{PositionBelief, Prior, Travelling};
+use crate::belief::{Prior, SentBelief, Travelling};
 use crate::best_fit::best_fit;
 use crate::posterior::Posterior;
 use crate::search_box::SearchBox;
@@ -74,7 +74,7 @@ impl Search {
             }
             (Some(Travelling::WithRate(belief)), _) => {
                 let position = Mixture::single(&belief.position())?;
-                (Prior::Position(PositionBelief::Mixture(position)), last)
+                (Prior::Position(SentBelief::Mixture(position)), last)
             }
             (Some(Travelling::Position(position)), _) => (Prior::Position(position.clone()), last),
         };

@@ -6,7 +6,7 @@ use fewbits_baselines::diffusive::polynomials::{hermite, multi_indices};
 use fewbits_baselines::diffusive::{Peak, lpg, particles};
 use fewbits_core::{Density, Gaussian, Likelihood};
 use fewbits_diffusive::{
-    Form, Outcome, PositionBelief, Posterior, RateModel, SelectionRule, Selector, SourceLikelihood, Status, Travelling,
+    Form, Outcome, Posterior, RateModel, SelectionRule, Selector, SentBelief, SourceLikelihood, Status, Travelling,
     project,
 };
 use fewbits_mixture_codec::MixtureFit;
@@ -26,7 +26,7 @@ fn exact(seed: u64, nodes: usize) -> Option<(Posterior, Outcome)> {
 /// `KL(exact || form)` of the position, nats.
 fn divergence(posterior: &Posterior, form: Form) -> f64 {
     match project(posterior, form, &RateModel::Known(1.0)).unwrap() {
-        Some(Travelling::Position(PositionBelief::Mixture(mixture))) => posterior.cells.kl_to(&mixture),
+        Some(Travelling::Position(SentBelief::Mixture(mixture))) => posterior.cells.kl_to(&mixture),
         Some(Travelling::Position(other)) => {
             let [x, y] = posterior.cells.columns();
             let logs = x.iter().zip(y).map(|(x, y)| other.log_density(&Vector2::new(*x, *y)));

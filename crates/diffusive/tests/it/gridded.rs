@@ -2,7 +2,7 @@
 
 use super::joint;
 use fewbits_core::{Belief, Gaussian};
-use fewbits_diffusion::{Plan, PotentialFlow, Scheme, SensorField, Transport};
+use fewbits_diffusion::{FluxRule, Plan, PotentialFlow, SensorField, Transport};
 use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::{
     Envelope, Error, Form, Outcome, Posterior, Prior, Search, SearchBox, SearchField, SelectionRule, SourceLikelihood,
@@ -47,7 +47,7 @@ fn places() -> Vec<Vector2<f64>> {
 fn field(split: usize) -> Arc<SensorField> {
     let domain = Plan::parse(PLAN).unwrap().domain(0.5, split, 0.0).unwrap();
     let wind = PotentialFlow::new(&domain, 0.05).unwrap().flow;
-    let transport = Transport::new(domain, 0.05, &wind, 0.0, Scheme::default()).unwrap();
+    let transport = Transport::new(domain, 0.05, &wind, 0.0, FluxRule::default()).unwrap();
     let points: Vec<[f64; 3]> = places().iter().map(|p| [p.x, p.y, 0.0]).collect();
     Arc::new(SensorField::steady(&transport, &points).unwrap())
 }

@@ -59,11 +59,11 @@ fn likelihoods_are_numbers_everywhere() {
     }
 }
 
-fn open_air(sensor: &SourceSensor, node: &Vector2<f64>, position: &Vector2<f64>) -> Vec<f64> {
+fn open_air(sensor: &SourceSensor, heights: [f64; 2], node: &Vector2<f64>, position: &Vector2<f64>) -> Vec<f64> {
     let wind = sensor.model().homogeneous().unwrap().wind;
     let air = Air::new(40.0, Vector3::new(wind.x, wind.y, 0.0), Ground::None).unwrap();
     let open = SourceSensor::new(air, sensor.instants().to_vec(), sensor.noise()).unwrap();
-    open.with_heights(sensor.source_height(), sensor.sensor_height())
+    open.with_heights(heights[0], heights[1])
         .unwrap()
         .responses(node, position)
         .unwrap()
@@ -96,7 +96,8 @@ proptest! {
         let ground = [Ground::None, Ground::Impermeable, Ground::Wall(Wall::ABSORBING)][ground];
         let air = Air::new(40.0, Vector3::new(3.0, 1.0, 0.0), ground).unwrap();
         let sensor = SourceSensor::new(air, vec![5.0, 25.0], 1e-9).unwrap();
-        let sensor = sensor.with_heights(20.0 * scale * scale, 20.0 * scale * scale * ratio).unwrap();
+        let heights = [20.0 * scale * scale, 20.0 * scale * scale * ratio];
+        let sensor = sensor.with_heights(heights[0], heights[1]).unwrap();
         let node = Vector2::new(50.0, 54.0);
         let position = node + Vector2::new(angle.cos(), angle.sin()) * 10.0_f64.powf(rho);
         let a = sensor.responses(&node, &position).unwrap();
@@ -104,7 +105,7 @@ proptest! {
         let direct = RateSums::of(record.samples(), &a, record.noise()).unwrap();
         let table = record.sums(&position);
         // Over absorbing ground the response is the difference of source and image.
-        let open = RateSums::of(record.samples(), &open_air(&sensor, &node, &position), record.noise()).unwrap();
+        let open = RateSums::of(record.samples(), &open_air(&sensor, heights, &node, &position), record.noise()).unwrap();
         prop_assert!((table.response - direct.response).abs() <= 1e-8 * open.response, "{} {}", table.response, direct.response);
         prop_assert!((table.correlation - direct.correlation).abs() <= 1e-8 * (open.response * direct.energy).sqrt());
     }

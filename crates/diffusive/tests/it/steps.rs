@@ -142,7 +142,7 @@ fn other_messages_are_refused() {
         assert!(search.decode(&place.nodes, &cut(bits, bits.bits() - 1)).is_err());
         let mut long = fewbits_core::BitWriter::new();
         long.append(bits);
-        long.write_bit(true);
+        long.write(1, 1).unwrap();
         assert!(search.decode(&place.nodes, &long.finish()).is_err());
         let mut other = search.clone();
         other.form = if form == Form::Raw { Form::Gaussian } else { Form::Raw };

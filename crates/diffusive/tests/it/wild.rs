@@ -31,7 +31,8 @@ proptest! {
             if node.iter().chain(source.iter()).all(|x| x.is_finite()) {
                 let responses = sensor.responses(&node, &source).unwrap();
                 prop_assert!(responses.iter().all(|r| !r.is_nan() && *r >= 0.0), "{:?} {:?} {:?}: {:?}", sensor, node, source, responses);
-                let at = Vector3::new(source.x, source.y, sensor.source_height());
+                let height = if [x[7], x[8]].iter().all(|h| *h >= 0.0 && h.is_finite()) { x[7] } else { 0.0 };
+                let at = Vector3::new(source.x, source.y, height);
                 let age = sensor.instants()[1] - sensor.start();
                 let SourceGradient { value: response, gradient: slope } =
                     sensor.model().source_gradient(&sensor.receptor(&node).unwrap(), &at, age);
@@ -43,9 +44,6 @@ proptest! {
         if let Ok(sums) = RateSums::of(&x[2..4], &x[4..6], x[6]) {
             let logs = [sums.log_given_rate(range.low()), sums.log_marginal(&range)];
             prop_assert!(logs.iter().all(|log| !log.is_nan() && *log < f64::INFINITY), "{:?} {:?}: {:?}", sums, range, logs);
-            let (mean, variance) = sums.rate_given_position(&range);
-            prop_assert!((range.low()..=range.high()).contains(&mean) && variance >= 0.0, "{:?} {:?}: {} {}", sums, range, mean, variance);
-            prop_assert!(!sums.chi_squared((mean, variance)).is_nan());
         }
         if let Ok(sums) = RateSums::of(&x[2..3], &[x[3].abs()], x[4]) {
             let log = sums.log_marginal(&range);

@@ -1,7 +1,7 @@
 //! The laws of schemes, on every scheme of this crate and all kinds of links.
 
 use fewbits_core::laws::{factor, message, scheme};
-use fewbits_core::{Deterministic, Error, Gaussian, Link, Message, Observation, Scheme, Sign};
+use fewbits_core::{Deterministic, Error, Gaussian, Link, Message, Observation, Quantized, Scheme, Sign};
 use fewbits_dymbo::{
     CellIndex, DymboFilter, InnovationWord, MultibitFilter, Multiple, Prediction, RoundedSample, ScalarFilter,
     ScalarPlant, SignBit,
@@ -87,7 +87,7 @@ fn innovation_words_obey() {
             mean: f64::NAN,
             deviation: unit,
         };
-        assert!(word.word(0.0, &nothing).is_err());
+        assert!(word.report_of(0.0, &nothing).is_err());
         assert!(word.factor(&nothing, &Observation::Lost, &Link::PERFECT).is_err());
         assert_eq!(message::round_trip(&prediction, &word.feedback_format()), Ok(128));
     }

@@ -2,7 +2,7 @@
 
 use fewbits_baselines::dymbo::SignFilter;
 use fewbits_baselines::dymbo::first_message::first_message_value;
-use fewbits_core::{Gaussian, Link, Observation, Sign};
+use fewbits_core::{Gaussian, Link, Observation, Quantized, Sign};
 use fewbits_dymbo::{
     CellIndex, CountFusion, DymboFilter, InnovationWord, MultibitFilter, Multiple, ParallelFilter, Prediction,
     RoundedSample, ScalarFilter, ScalarPlant, SignBit,
@@ -64,7 +64,7 @@ proptest! {
         let _ = SignBit::new(x[0]);
         if let Ok(word) = InnovationWord::new(x[0], bits as usize) {
             let prediction = Prediction { mean: x[1], deviation: x[2] };
-            let _ = (word.word(x[3], &prediction), word.cell(CellIndex(multiple as u16), &prediction));
+            let _ = (word.report_of(x[3], &prediction), word.only_cell(&CellIndex(multiple as u16), &prediction));
         }
         let Ok(scheme) = RoundedSample::new(x[0], x[1]).and_then(|scheme| scheme.with_bits(bits)) else { return Ok(()) };
         let _ = (scheme.round(x[2]), scheme.cell(Multiple(multiple)));

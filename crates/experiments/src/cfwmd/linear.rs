@@ -6,7 +6,7 @@ use super::world::{At, Centre, Draws, Known, Named, World};
 use crate::prelude::*;
 use fewbits_baselines::cfwmd::trigger::{StochasticTrigger, Triggered};
 use fewbits_baselines::cfwmd::{ImputedBelief, Weighing, fuse_received, imputing, likelihood_of_particles};
-use fewbits_cfwmd::censored::Censored;
+use fewbits_cfwmd::censored::{Censored, MissingReports};
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::no_feedback::{JointBelief, LocalSensor, joint};
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion, OwnStep};
@@ -308,8 +308,11 @@ impl<const M: usize> Line<M> {
                     let known = fuse_received(&network, &predicted, &observations)?.0;
                     match self.scattered(method, k, &predicted, &prior) {
                         Some((direction, centre, noise)) if received < observations.len() => {
-                            let silent = observations.len() - received;
-                            let factor = Censored::silence(&self.own[k].1, &centre, &noise, &Link::PERFECT, silent)?;
+                            let silent = MissingReports {
+                                nothing: observations.len() - received,
+                                lost: 0,
+                            };
+                            let factor = Censored::missing(&self.own[k].1, &centre, &noise, &Link::PERFECT, silent)?;
                             assumed_density::update(&known, &direction, &factor)?.0
                         }
                         _ => known,

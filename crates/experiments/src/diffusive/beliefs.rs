@@ -3,7 +3,7 @@
 use super::common::{B, CHAINS, LPG, Scheme, Settings};
 use crate::prelude::*;
 use fewbits_core::Density;
-use fewbits_diffusive::{Form, PositionBelief, Posterior, RateModel, Travelling, project};
+use fewbits_diffusive::{Form, Posterior, RateModel, SentBelief, Travelling, project};
 use fewbits_mixture_codec::{Clumps, MixtureFit};
 
 /// Only the position is approximated here.
@@ -15,7 +15,7 @@ fn divergence(posterior: &Posterior, form: Form) -> Result<f64, Error> {
         return Ok(0.0);
     };
     let kl = match &belief {
-        PositionBelief::Mixture(mixture) => posterior.cells.kl_to(mixture),
+        SentBelief::Mixture(mixture) => posterior.cells.kl_to(mixture),
         other => {
             let [x, y] = posterior.cells.columns();
             let logs = x.iter().zip(y).map(|(x, y)| other.log_density(&Vector2::new(*x, *y)));

@@ -2,7 +2,7 @@
 
 use super::plan_belief::{Instrument, PlanBelief, Report, THRESHOLDS};
 use crate::Error;
-use fewbits_diffusion::{Domain, Flow, Plan, PotentialFlow, Scheme, SensorField, Transport};
+use fewbits_diffusion::{Domain, Flow, FluxRule, Plan, PotentialFlow, SensorField, Transport};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_monte_carlo::Stream;
 use nalgebra::Vector3;
@@ -62,7 +62,7 @@ impl Building {
         };
         let velocities: Vec<Vector3<f64>> = flow.velocities(&domain).into_iter().map(Vector3::from).collect();
         let mean = velocities.iter().sum::<Vector3<f64>>() / velocities.len() as f64;
-        let transport = Transport::new(domain, DIFFUSIVITY, &flow, 0.0, Scheme::default())?;
+        let transport = Transport::new(domain, DIFFUSIVITY, &flow, 0.0, FluxRule::default())?;
         let free = Air::new(DIFFUSIVITY, mean, Ground::None)?.with_closest(0.5 * CELL)?;
         Ok(Self { transport, free })
     }

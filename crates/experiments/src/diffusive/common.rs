@@ -243,7 +243,9 @@ impl Track {
             // The first samples already excluded the prior.
             errors.push((Vector2::from(ALARM) - source).norm());
         }
-        let nees = steps.iter().filter_map(|s| s.estimate.mahalanobis_squared(source).ok());
+        let nees = steps
+            .iter()
+            .filter_map(|s| Some(2.0 * s.estimate.normalised_error_squared(source).ok()?));
         Self {
             status: outcome.status,
             errors,

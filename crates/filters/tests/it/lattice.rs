@@ -80,7 +80,11 @@ fn three_independent_axes_are_three_lines() {
         .unwrap()
         .predict(&start)
         .unwrap();
-    assert!((next.density().iter().sum::<f64>() * next.volume() - 1.0).abs() < 1e-12);
+    assert!(
+        (next.density().iter().sum::<f64>() * next.axes().iter().map(UniformGrid::spacing).product::<f64>() - 1.0)
+            .abs()
+            < 1e-12
+    );
     for (axis, grid) in grids.into_iter().enumerate() {
         let (mean, deviation) = ([0.0, 0.5, 1.0][axis], [0.8, 0.9, 1.0][axis]);
         let line = PointMass::normal(grid, mean, deviation * deviation).unwrap();

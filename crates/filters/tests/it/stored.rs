@@ -33,7 +33,7 @@ fn beliefs_factors_and_models_come_back_to_the_bit() {
                 .with_erasure(0.1 + x[1] / 30.0)
                 .unwrap(),
         );
-        check(&number::Levels::new(x[0], x[0] + 1.0 / 3.0, 5).unwrap());
+        check(&number::EvenLevels::new(x[0], x[0] + 1.0 / 3.0, 5).unwrap());
         let cell = Cell::new(x[5], f64::INFINITY).unwrap();
         check(&cell);
         check(&Scalar::from(Levels::new(cell, 1.0 + x[0].abs(), 0.1, 0.7).unwrap()));

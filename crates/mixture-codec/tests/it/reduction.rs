@@ -3,7 +3,7 @@
 use crate::common::{crescent, d1_scaled, random_mixture};
 use fewbits_baselines::mixture_codec::quadrature::integrated;
 use fewbits_densities::{Bandwidth, Component, KernelEstimate, Mixture, Particles};
-use fewbits_mixture_codec::cut::{greedy, greedy_within, optimal};
+use fewbits_mixture_codec::cut::{Cut, greedy, greedy_within, optimal};
 use fewbits_mixture_codec::merge::{MergeCost, merge};
 use fewbits_mixture_codec::plug_in::{cubature, node_errors, plug_in};
 use fewbits_mixture_codec::tree::{At, Axis};
@@ -54,8 +54,8 @@ proptest! {
             for criterion in CRITERIA {
                 let errors = NodeErrors::new(&estimate, &tree, criterion).unwrap();
                 let (best, greedy) = (optimal(&tree, &errors, m).unwrap(), greedy(&tree, &errors, m).unwrap());
-                tree.check_cut(&best.nodes).unwrap();
-                tree.check_cut(&greedy.nodes).unwrap();
+                best.mixture(&tree).unwrap();
+                greedy.mixture(&tree).unwrap();
                 prop_assert!(best.nodes.len() <= m && greedy.nodes.len() <= m);
                 let brute = brute_force(&tree, &errors, m);
                 prop_assert!((best.bound - brute).abs() < 1e-12, "{} {}", best.bound, brute);
@@ -251,7 +251,7 @@ fn any_errors_are_cut_optimally() {
             }
             for m in 1..=10 {
                 let best = optimal(&tree, &errors, m).unwrap();
-                assert!(best.nodes.len() <= m && tree.check_cut(&best.nodes).is_ok());
+                assert!(best.nodes.len() <= m && best.mixture(&tree).is_ok());
                 assert!((best.bound - brute_force(&tree, &errors, m)).abs() < 1e-14, "{criterion:?} {m}");
                 // Of the cuts on the greedy way the best.
                 let found = greedy(&tree, &errors, m).unwrap();
@@ -358,10 +358,15 @@ fn trees_are_cut_where_they_say_and_nodes_are_what_they_hold() {
         let leaves: Vec<usize> = (0..tree.nodes().len())
             .filter(|i| tree.nodes()[*i].children.is_none())
             .collect();
-        assert!(
-            tree.check_cut(&leaves).is_ok() && tree.check_cut(&leaves[1..]).is_err() && tree.check_cut(&[]).is_err()
-        );
-        assert!(tree.check_cut(&[0, 1]).is_err() && tree.check_cut(&[99]).is_err());
+        let is_cut = |nodes: &[usize]| {
+            Cut {
+                nodes: nodes.to_vec(),
+                bound: 0.0,
+            }
+            .mixture(&tree)
+            .is_ok()
+        };
+        assert!(is_cut(&leaves) && !is_cut(&leaves[1..]) && !is_cut(&[]) && !is_cut(&[0, 1]) && !is_cut(&[99]));
         assert!(tree.members(99).is_empty());
     }
 }

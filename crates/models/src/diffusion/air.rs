@@ -107,11 +107,6 @@ impl Air {
         &self.wind
     }
 
-    /// The shortest distance, m; shorter ones are replaced by it.
-    pub(crate) fn closest(&self) -> f64 {
-        self.closest
-    }
-
     /// Sign of the image source below the ground; `None` over permeable ground, where there is no image.
     fn image(&self) -> Option<f64> {
         match self.ground {

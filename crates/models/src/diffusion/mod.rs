@@ -10,7 +10,7 @@
 //! | three dimensions with wind | [`Space`] |
 //! | a source that releases at a constant rate, closed form, with gradient | [`Air`] |
 //! | a release that lasts, varies, moves, covers a disk | [`Release`], [`moving_source`], [`disk_source`] |
-//! | the region where the concentration exceeds a threshold | [`contour_radius`], [`contour`] |
+//! | the region where the concentration exceeds a threshold | [`contour_radius`] |
 //! | a table of the response, for many distances | [`Profile`] |
 //!
 //! Rooms, slabs, vessels and media of varying diffusivity have no closed form, or one for each shape. The crate
@@ -44,7 +44,7 @@ mod space;
 pub use crate::source_model::SourceGradient;
 pub use air::{Air, Ground};
 pub use axis::Axis;
-pub use contour::{contour, contour_radius};
+pub use contour::contour_radius;
 pub use extended::{disk_source, moving_source};
 pub use half_space::{Flux, Wall};
 pub use profile::Profile;

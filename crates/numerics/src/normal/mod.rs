@@ -9,7 +9,7 @@
 //! | `ln Phi(x)` | [`log_cdf`] | both tails |
 //! | `ln(Phi(b) - Phi(a))` | [`log_interval`] | both tails, narrow and wide |
 //! | `phi(x) / Phi(x)` | [`inverse_mills`] | both tails |
-//! | mean and variance beyond a one-sided cut | [`one_sided`], [`one_sided_variance`] | both tails |
+//! | mean and variance beyond a one-sided cut | [`one_sided`] | both tails |
 //! | mean and variance in a cell | [`truncated_moments`] | narrow, far and unbounded cells |
 //! | a draw from a cell | [`sample_truncated`] | narrow, far and unbounded cells |
 //!
@@ -20,7 +20,7 @@ mod one_sided;
 mod quantile;
 mod truncated;
 
-pub use one_sided::{OneSided, one_sided, one_sided_variance};
+pub use one_sided::{OneSided, one_sided};
 pub use quantile::quantile;
 pub use truncated::{TruncatedMoments, sample_truncated, truncated_moments};
 

@@ -1,6 +1,6 @@
 //! The variance of a normal variable beyond a cut.
 
-use super::{INV_SQRT_2PI, inverse_mills};
+use super::INV_SQRT_2PI;
 use crate::kernels::elementary::polynomial;
 use crate::kernels::tail::{cut, scaled_tail};
 
@@ -59,15 +59,10 @@ const FAR_DENOMINATOR: [f64; 9] = [
     21413468.817361765,
 ];
 
-/// Variance of a standard normal variable known to exceed `-x`: `1 - lambda (lambda + x)` with `lambda = phi(x)/Phi(x)`.
-///
-/// Equals 1 for `x -> inf`, `1 - 2/pi` at 0 and `~ 1/x^2` for `x -> -inf`, where the formula would cancel; relative error
-/// below 1e-14 everywhere.
+/// Variance of a standard normal variable known to exceed `-x >= 0`, where `1 - lambda (lambda + x)` would cancel.
 #[inline]
-pub fn one_sided_variance(x: f64) -> f64 {
-    if x > 0.0 {
-        variance_with_mean(x, inverse_mills(x))
-    } else if x >= -SPLIT {
+fn variance_beyond(x: f64) -> f64 {
+    if x >= -SPLIT {
         polynomial(&NEAR_NUMERATOR, -x) / polynomial(&NEAR_DENOMINATOR, -x)
     } else {
         let u = 1.0 / (x * x);
@@ -75,21 +70,14 @@ pub fn one_sided_variance(x: f64) -> f64 {
     }
 }
 
-/// The variance by its formula, for a cut left of the mean.
-#[inline]
-fn variance_with_mean(x: f64, mean: f64) -> f64 {
-    // If the mean has underflowed, x may be infinite; their product is 0 in the limit.
-    if mean == 0.0 { 1.0 } else { 1.0 - mean * (mean + x) }
-}
-
 /// Probability of the event `X > -x` for a standard normal variable `X`, and the moments of `X` given this event.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OneSided {
     /// `ln Phi(x)`, as [`log_cdf`](super::log_cdf) gives it, to rounding.
     pub log_probability: f64,
-    /// Mean of `X` given the event, `phi(x)/Phi(x)`, as [`inverse_mills`] gives it.
+    /// Mean of `X` given the event, `phi(x)/Phi(x)`, as [`inverse_mills`](super::inverse_mills) gives it.
     pub mean: f64,
-    /// Variance of `X` given the event, as [`one_sided_variance`] gives it.
+    /// Variance of `X` given the event: 1 for `x -> inf`, `1 - 2/pi` at 0 and `~ 1/x^2` for `x -> -inf`; relative error below 1e-14.
     pub variance: f64,
 }
 
@@ -101,7 +89,7 @@ pub fn one_sided(x: f64) -> OneSided {
         return OneSided {
             log_probability: scaled.ln() - 0.5 * x * x,
             mean: INV_SQRT_2PI / scaled,
-            variance: one_sided_variance(x),
+            variance: variance_beyond(x),
         };
     }
     let cut = cut(x);
@@ -109,6 +97,7 @@ pub fn one_sided(x: f64) -> OneSided {
     OneSided {
         log_probability: (-cut.outside).ln_1p(),
         mean,
-        variance: variance_with_mean(x, mean),
+        // If the mean has underflowed, x may be infinite; their product is 0 in the limit.
+        variance: if mean == 0.0 { 1.0 } else { 1.0 - mean * (mean + x) },
     }
 }

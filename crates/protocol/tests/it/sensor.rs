@@ -157,9 +157,6 @@ fn clocked_sensor_follows_the_centres_clock() {
 fn schedules_end_with_the_range_of_times() {
     let longest = Schedule::new(NonZeroU64::new(u64::MAX).unwrap());
     assert_eq!(longest.start(u64::MAX), u64::MAX);
-    let mut shortest = Schedule::new(NonZeroU64::MIN);
-    shortest.synchronise(Slot::of_count(3), u64::MAX);
-    assert_eq!(Slot::of_count(shortest.count(u64::MAX)), Slot::of_count(3));
     let mut settings = SensorSettings::new(Feedback::Clock);
     settings.schedule = Some(Schedule::new(NonZeroU64::MIN));
     let reaction = Sensor::new(settings).on_timer(u64::MAX, SensorTimer::SlotBegins);

@@ -133,7 +133,10 @@ proptest! {
             _ => Some(Observation::Received(bits(&bytes, w >> 8))),
         });
         let allowed = observed.iter().zip(lengths).all(|(seen, length)| match seen {
-            Some(Observation::Received(report)) => length.allows(report.bits()),
+            Some(Observation::Received(report)) => match length {
+                ReportLength::Fixed(expected) => report.bits() == expected as usize,
+                ReportLength::Varying => report.bits() < 1 << 16,
+            },
             _ => true,
         });
         if let Ok(told) = echo(&observed, &lengths) && allowed {
@@ -145,12 +148,9 @@ proptest! {
     }
 
     #[test]
-    fn schedules_count_what_they_start(period in number(), count in number(), now in number(), slot in number()) {
-        let mut schedule = Schedule::new(NonZeroU64::new(period).unwrap_or(NonZeroU64::MIN));
+    fn schedules_count_what_they_start(period in number(), count in number(), now in number()) {
+        let schedule = Schedule::new(NonZeroU64::new(period).unwrap_or(NonZeroU64::MIN));
         prop_assert!(schedule.start(schedule.count(now)) <= now);
         let _ = schedule.start(count);
-        schedule.synchronise(Slot::of_count(slot), now);
-        prop_assert_eq!(Slot::of_count(schedule.count(now)), Slot::of_count(slot));
-        prop_assert_eq!(schedule.start(schedule.count(now)), now);
     }
 }

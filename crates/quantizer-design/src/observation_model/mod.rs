@@ -21,7 +21,7 @@ pub(crate) use resolution::Resolution;
 pub use sample::SampleFit;
 
 use crate::error::{Error, refuse};
-use crate::outcomes::Feature;
+use crate::outcomes::NodeWeights;
 use fewbits_numerics::normal;
 use nodes::PRIOR_STEP;
 use resolution::{NODE_LIMIT, grid, too_fine};
@@ -51,10 +51,10 @@ pub struct ObservationModel {
     /// Given a node the sensors are independent, and sensor `n` has mean `base + loading_n * factor`.
     nodes: Vec<Node>,
     /// `P(node | x_k)`.
-    pub(crate) given: Vec<Feature>,
+    pub(crate) given: Vec<NodeWeights>,
     /// Sums over the prior: `sum_k w_k P(node | x_k)` and the same with `w_k (x_k - mean)`.
-    pub(crate) mass: Feature,
-    pub(crate) moment: Feature,
+    pub(crate) mass: NodeWeights,
+    pub(crate) moment: NodeWeights,
     /// Prior mean, about which moments are taken, and variance.
     pub(crate) mean: f64,
     pub(crate) variance: f64,
@@ -124,7 +124,7 @@ impl ObservationModel {
             return refuse("prior", shown, "a prior with values whose squares are in the range of numbers");
         }
         let (nodes, given) = if noise.is_independent() {
-            let itself = |start| Feature {
+            let itself = |start| NodeWeights {
                 start,
                 weights: vec![1.0],
             };
@@ -150,8 +150,8 @@ impl ObservationModel {
             weights,
             nodes,
             given,
-            mass: Feature::of_all(mass),
-            moment: Feature::of_all(moment),
+            mass: NodeWeights::of_all(mass),
+            moment: NodeWeights::of_all(moment),
             mean,
             variance,
         })
@@ -241,7 +241,7 @@ impl ObservationModel {
 
     /// `P(node | x_k)` for every value, for sums over nodes.
     #[doc(hidden)]
-    pub fn given(&self) -> &[Feature] {
+    pub fn given(&self) -> &[NodeWeights] {
         &self.given
     }
 
@@ -253,7 +253,7 @@ impl ObservationModel {
 }
 
 /// Nodes, and the probability of the nodes given each value.
-type Resolved = (Vec<Node>, Vec<Feature>);
+type Resolved = (Vec<Node>, Vec<NodeWeights>);
 
 /// Nodes of `s = x + a u`. If all loadings `a` are equal, everything depends on `s` only. `None` if they are not, if the
 /// prior is discrete, or if two axes need fewer nodes because the shared factor is small.
@@ -282,7 +282,7 @@ fn on_one_axis(
         let start = offsets.partition_point(|s| *s < x - reach);
         let end = offsets.partition_point(|s| *s <= x + reach);
         let weights = offsets[start..end].iter().map(|s| normal::pdf((s - x) / shared));
-        Feature {
+        NodeWeights {
             start,
             weights: normalised(weights.collect()),
         }
@@ -310,7 +310,7 @@ fn on_two_axes(noise: &Noise, values: &[f64], crowd: f64, resolution: Resolution
     let pairs = values
         .iter()
         .flat_map(|x| factors.iter().map(|u| Node { base: *x, factor: *u }));
-    let given = (0..values.len()).map(|k| Feature {
+    let given = (0..values.len()).map(|k| NodeWeights {
         start: k * count,
         weights: weights.clone(),
     });

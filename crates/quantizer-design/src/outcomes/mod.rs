@@ -14,11 +14,11 @@
 //! `sensor-assignment` those of assignments. A table has one row per symbol, count vector or cell, and one column per node.
 //!
 //! ```
-//! use fewbits_quantizer_design::outcomes::{Feature, Table, cell_probabilities, moments};
+//! use fewbits_quantizer_design::outcomes::{NodeWeights, Table, cell_probabilities, moments};
 //! // Three equal sensors report the sign of a sample in unit noise; the unknown is -1 or 1.
 //! let signs = cell_probabilities(&[-1.0, 1.0], 1.0, &[0.0]);
 //! let counts = signs.of_counts(3);
-//! let joint = moments(&[&counts], &[Feature::of_all(vec![0.5, 0.5])]);
+//! let joint = moments(&[&counts], &[NodeWeights::of_all(vec![0.5, 0.5])]);
 //! assert!(joint.len() == 4 && (joint.iter().sum::<f64>() - 1.0).abs() < 1e-14);
 //! ```
 
@@ -29,5 +29,5 @@ mod table;
 
 pub(crate) use sums::moments_until;
 pub use sums::{IMPOSSIBLE, explained, for_each, for_each_log, moments};
-pub use table::{Feature, Table, cell_probabilities, dot};
+pub use table::{NodeWeights, Table, cell_probabilities, dot};
 pub(crate) use table::{SETTLED, add_scaled, intervals};

@@ -1,6 +1,6 @@
 //! Sums over nodes of products of per-group tables. Most of the computing time is spent here.
 
-use super::table::{Feature, Table, dot};
+use super::table::{NodeWeights, Table, dot};
 use crate::deadline::Deadline;
 use std::borrow::Borrow;
 use std::ops::ControlFlow;
@@ -42,14 +42,14 @@ fn dot_with_four(a: &[f64], rows: [&[f64]; 4]) -> [f64; 4] {
 /// `sum_node feature(node) prod_g table_g[r_g](node)` for every combination of one row per table, and every feature.
 ///
 /// Layout of the result: the row of the first table varies slowest, the feature fastest. All tables have the same nodes.
-pub fn moments(tables: &[impl Borrow<Table>], features: &[Feature]) -> Vec<f64> {
+pub fn moments(tables: &[impl Borrow<Table>], features: &[NodeWeights]) -> Vec<f64> {
     moments_until(tables, features, Deadline::NEVER).unwrap_or_default()
 }
 
 /// As [`moments`]; `None` if the time limit is reached first.
 pub(crate) fn moments_until(
     tables: &[impl Borrow<Table>],
-    features: &[Feature],
+    features: &[NodeWeights],
     deadline: Deadline,
 ) -> Option<Vec<f64>> {
     let combinations: usize = tables.iter().map(|t| t.borrow().rows()).product();
@@ -119,7 +119,7 @@ fn descend(
 }
 
 /// Appends the sums of `prefix` with every row of the last table, for each feature.
-fn sums_with(last: &Table, features: &[Feature], prefix: &[f64], weighted: &mut [f64], out: &mut Vec<f64>) {
+fn sums_with(last: &Table, features: &[NodeWeights], prefix: &[f64], weighted: &mut [f64], out: &mut Vec<f64>) {
     let base = out.len();
     out.resize(base + last.rows() * features.len(), 0.0);
     for (f, feature) in features.iter().enumerate() {

@@ -13,14 +13,14 @@ pub struct Table {
 
 /// Weights on a range of nodes: a linear functional of functions on the nodes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Feature {
+pub struct NodeWeights {
     /// The first node of the range.
     pub start: usize,
     /// The weights, from the first node of the range on.
     pub weights: Vec<f64>,
 }
 
-impl Feature {
+impl NodeWeights {
     /// A weight for every node.
     pub fn of_all(weights: Vec<f64>) -> Self {
         Self { start: 0, weights }

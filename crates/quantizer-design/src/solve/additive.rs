@@ -13,7 +13,7 @@ const RANK_TOLERANCE: f64 = 1e-12;
 
 /// The best estimate of the form `offset + sum_n weight_n[symbol_n]`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct AdditiveDecoder {
+pub(super) struct AdditiveDecoder {
     /// Mean of the unknown.
     pub offset: f64,
     /// For every sensor, a number per symbol.
@@ -27,7 +27,7 @@ impl AdditiveDecoder {
     ///
     /// # Errors
     /// If there is not one symbol per sensor, or a symbol is out of range.
-    pub fn decode(&self, symbols: &[usize]) -> Result<f64, Error> {
+    pub(super) fn decode(&self, symbols: &[usize]) -> Result<f64, Error> {
         entries("symbols", symbols.len(), self.weights.len())?;
         symbols
             .iter()
@@ -44,7 +44,7 @@ impl Solution {
     ///
     /// # Errors
     /// If a symbol table cannot be computed, which cannot happen for a design that has a value.
-    pub fn additive_decoder(&self) -> Result<AdditiveDecoder, Error> {
+    pub(super) fn additive_decoder(&self) -> Result<AdditiveDecoder, Error> {
         let (system, model) = (self.system(), self.system().model());
         let mut tables: Vec<Table> = vec![Table::default(); model.sensors()];
         for (group, symbols) in system.groups().iter().zip(symbol_tables(system)?) {

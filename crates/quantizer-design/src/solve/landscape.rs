@@ -9,7 +9,7 @@ use crate::deadline::Deadline;
 use crate::error::Error;
 use crate::law::negative_entropy;
 use crate::observation_model::{ObservationModel, Resolution};
-use crate::outcomes::{Feature, Table, add_scaled, cell_probabilities, dot, intervals, moments_until};
+use crate::outcomes::{NodeWeights, Table, add_scaled, cell_probabilities, dot, intervals, moments_until};
 use fewbits_quantizers::Channel;
 
 /// Half-width of the table of a sample, in its standard deviations.
@@ -32,7 +32,7 @@ fn mix(law: &Channel, output: usize, words: &[f64], renamed: &[usize], outcome: 
 struct Scenario {
     weight: f64,
     model: ObservationModel,
-    features: Vec<Feature>,
+    features: Vec<NodeWeights>,
 }
 
 /// The grid of one sensor: edges, and the probability of each cell at each node, for each scenario.
@@ -132,7 +132,7 @@ impl Landscape {
                     // The moments of all scenarios are taken about the same point.
                     let (offset, mass) = (model.mean - reference, &model.mass.weights);
                     let moment = model.moment.weights.iter().zip(mass).map(|(m, w)| m + offset * w);
-                    vec![model.mass.clone(), Feature::of_all(moment.collect())]
+                    vec![model.mass.clone(), NodeWeights::of_all(moment.collect())]
                 } else {
                     scored.features().to_vec()
                 };

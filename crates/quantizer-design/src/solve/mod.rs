@@ -35,9 +35,8 @@ mod share;
 mod solution;
 mod starts;
 
-pub use crate::deadline::{Clock, system_clock};
+pub use crate::deadline::Clock;
 pub use adc::{Adc, Rounded};
-pub use additive::AdditiveDecoder;
 pub use control::{Progress, Stage, Watch};
 pub use export::{Export, JSON_SCHEMA};
 pub use participant::{SensorDesign, WordedCells};

@@ -73,7 +73,7 @@ pub struct Request<'a> {
     /// The search ends after this time with the best design so far. Computing its value takes additional time: a fraction of a second, or
     /// some seconds for a million joint symbols with correlated unequal noise.
     pub time_limit: Option<Duration>,
-    /// The clock (default: [`system_clock`]). Another one is needed for a time limit and for
+    /// The clock (default: the system's). Another one is needed for a time limit and for
     /// [`Progress::elapsed`](super::Progress::elapsed) where the standard library has no clock, as in a browser.
     pub clock: Clock,
     /// Called between steps of the search. If it breaks, the search ends with the best design so far, which is marked as cut short.

@@ -122,19 +122,18 @@ fn the_rust_constants_are_the_design() {
     let joint = rounded.export("plant", 4096).unwrap();
     let pairs = (0..5).flat_map(|a| (0..3).map(move |b| [a, b]));
     let means: Vec<f64> = pairs.map(|symbols| joint.decode(&symbols).unwrap()).collect();
-    let additive = rounded.solution.additive_decoder().unwrap();
-    let mut linear = vec![numbers(&[additive.offset])];
-    linear.extend(additive.weights.iter().map(|w| numbers(w)));
+    let additive = rounded.export("plant", 64).unwrap();
+    let stored: serde_json::Value = serde_json::from_str(&additive.to_json().unwrap()).unwrap();
+    let of = |part: &str| stored["decoder"][part].clone();
+    let weights: Vec<Vec<f64>> = serde_json::from_value(of("weights")).unwrap();
+    let mut linear = vec![numbers(&[of("offset").as_f64().unwrap()])];
+    linear.extend(weights.iter().map(|w| numbers(w)));
     let sensors: String = (0..2)
         .map(|n| format!("bits(&plant::BREAKPOINTS_{n}); all(&plant::WORDS_{n}); all(&plant::THRESHOLDS_{n});"))
         .collect();
     let cases = [
         (joint, "bits(&plant::MEANS);", vec![numbers(&means)]),
-        (
-            rounded.export("plant", 64).unwrap(),
-            "bits(&plant::OFFSET); bits(&plant::WEIGHTS_0); bits(&plant::WEIGHTS_1);",
-            linear,
-        ),
+        (additive, "bits(&plant::OFFSET); bits(&plant::WEIGHTS_0); bits(&plant::WEIGHTS_1);", linear),
     ];
     for (i, (export, decoder, tail)) in cases.into_iter().enumerate() {
         let directory = Directory(std::env::temp_dir().join(format!("fewbits-rust-{i}-{}", std::process::id())));

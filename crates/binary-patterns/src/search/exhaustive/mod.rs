@@ -65,7 +65,7 @@ impl LinearSearch {
         let outcomes = repeats.saturating_add(1).saturating_pow(distinct);
         Error::at_most("the table of outcomes", outcomes.min(2u128.saturating_pow(self.sensors as u32)), MAX_OUTCOMES)?;
         let walk = Walk::new(self, keep)?;
-        let root = Outcomes::new(&walk.candidates.nodes.w);
+        let root = Outcomes::new(&walk.candidates.nodes.weights);
         let mut found = walk.branch(0, self.sensors, Span::default(), &[], root);
         found.finish();
         Ok(found.sets)

@@ -77,7 +77,7 @@ impl<'a> Walk<'a> {
             .collect::<Result<Vec<_>, _>>()?;
         let candidates = Candidates::new(&search.source, &quantizers, &[search.noise_deviation]);
         let tables_of = |quantizer: &BinaryQuantizer| {
-            let p = quantizer.probabilities_at(&candidates.nodes.x, search.noise_deviation);
+            let p = quantizer.probabilities_at(&candidates.nodes.points, search.noise_deviation);
             (1..=search.sensors).map(|count| p.of_counts(count)).collect()
         };
         let tables: Vec<Vec<Table>> = quantizers.iter().map(tables_of).collect();
