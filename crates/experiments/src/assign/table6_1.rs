@@ -123,6 +123,8 @@ impl Figure for Table {
         let matched = find(all, "optimal").map_or(f64::NAN, |r| r.approx - quantization_error(1.0, p.variances.len()));
         let what = "the dual variables prove the optimum: their sum is the cost (erratum binary-20)";
         claims.near("duality", what, dual, matched, 1e-15 + 1e-12 * matched);
+        let what = "and none exceeds a cost";
+        claims.all("dual-feasible", what, &rows.costs, |c| c.dual_bit + c.dual_sensor <= c.gamma + 1e-12);
         let what = "read as standard deviations the error of assignment I would be 2e-4 (erratum assign-1)";
         let other = find(&rows.as_deviations, "I").map(|r| r.center);
         here.near("deviations", what, other, 2.0e-4, 1e-5);

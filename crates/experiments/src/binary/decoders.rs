@@ -96,11 +96,23 @@ impl Figure for Decoders {
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
         let of = |kind: &'static str| select(&rows.curves, move |r| r.source == kind);
+        let at_most = 1.0 + 1e-9;
         let what = "the posterior mean is no worse than any other decoder, for either source (erratum binary-17)";
         claims.all("mmse", what, &rows.curves, |r| {
             let others = [r.cmap, r.dmap, r.dmap_print, r.dmap_exact];
-            others.iter().all(|other| r.mmse <= other * (1.0 + 1e-9))
+            others.iter().all(|other| r.mmse <= other * at_most)
         });
+        type Bound = (&'static str, &'static str, fn(&Row) -> f64);
+        let bounds: [Bound; 3] = [
+            ("van-trees", "the optimal-weight van Trees value", |r| r.vt),
+            ("rate-distortion", "the rate-distortion value of N bits", |r| r.rd_per_n),
+            ("central", "the centralised value", |r| r.central),
+        ];
+        for (id, what, bound) in bounds {
+            claims.all(id, format!("{what} is a bound"), &rows.curves, |r| bound(r) <= r.mmse * at_most);
+        }
+        let what = "the exact centralised bound is above the rate-distortion bound";
+        claims.all("central-tighter", what, &rows.curves, |r| r.rd_per_n <= r.central * at_most);
         let what = "for a uniform source the continuous MAP decoder is worse than the discrete one throughout (erratum binary-15)";
         claims.all("uniform-cmap", what, of("uniform"), |r| r.cmap > r.dmap);
         let what = "for a Gaussian source continuous MAP beats discrete MAP up to 13 dB and loses from 14 dB on";
@@ -108,6 +120,8 @@ impl Figure for Decoders {
             snr if snr <= 13.0 => r.cmap < r.dmap,
             snr => snr < 14.0 || r.cmap > r.dmap,
         });
+        let what = "for a Gaussian source equation 5.13 is a bound";
+        claims.all("gaussian-crlb", what, of("gaussian"), |r| r.crlb <= r.mmse * at_most);
         let what =
             "exact cell probabilities change the discrete decoder's error by less than a hundredth (erratum binary-5)";
         claims.all("exact-division", what, &rows.curves, |r| (r.dmap_exact / r.dmap - 1.0).abs() < 0.01);

@@ -114,5 +114,9 @@ impl Figure for Feedback {
         claims.all("aq-ml", what, from(5.0), |r| r.aqml_mle < r.lbqp_best);
         let what = "posterior-mean thresholds beat AQ-ML's estimate from 5 dB on";
         claims.all("feedback-mmse", what, from(5.0), |r| r.aq_posterior_mean < r.aqml_mle);
+        let what = "AQ-ML with the posterior mean is no worse than with its own estimate";
+        claims.all("decoder", what, rows, |r| r.aqml_mmse <= r.aqml_mle);
+        let what = "nothing is below the unquantized estimate";
+        claims.all("floor", what, rows, |r| r.clairvoyant <= r.lbqp_best.min(r.aq_posterior_mean));
     }
 }

@@ -85,11 +85,17 @@ impl Figure for GaussianSource {
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
         let errors = &rows.errors;
+        let what = "the corrected distortion-rate function bounds every set";
+        claims.all("bound", what, errors, |r| r.dr_per_n <= r.mse_unconstrained * (1.0 + 1e-9));
+        let what = "the van Trees bound is below the best basis";
+        claims.all("van-trees", what, errors, |r| r.vt <= r.mse_opt * (1.0 + 1e-9));
         let violated = errors.iter().filter(|r| r.mse_signs < r.dr_print).count();
         let what = "three sign bits fall below the printed function somewhere (erratum binary-6)";
         here.at_least("printed-violated", what, violated as f64, 1.0);
         let from = rows.crossings.last().map_or(f64::NAN, |c| c.snr_db);
         let what = "Gray is the best basis above 6.032 dB and only there";
         claims.all("gray-above", what, errors, |r| (r.masks.0 == GRAY) == (r.snr_db > from));
+        let what = "and never better than the best";
+        claims.all("gray-no-better", what, errors, |r| r.mse_gray >= r.mse_opt * (1.0 - 1e-9));
     }
 }

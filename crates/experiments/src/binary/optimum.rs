@@ -127,6 +127,10 @@ impl Figure for Optimum {
         let here = claims.at_defaults();
         let all = &rows.errors;
         let of = |sensors: usize| select(all, move |r| r.sensors == sensors);
+        let what = "dropping the rank constraint never hurts, forcing the Gray basis never helps";
+        claims.all("order", what, all, |r| {
+            r.mse_unconstrained <= r.mse_opt * (1.0 + 1e-9) && r.mse_strategy1 >= r.mse_opt * (1.0 - 1e-9)
+        });
         let what = "from 5 dB on eight optimal sensors beat Luo's under every fusion rule";
         here.all("luo", what, of(8).filter(|r| r.snr_db >= 5.0), |r| {
             let luo = [r.luo_soft, r.luo_mmse, r.luo_majority];
@@ -162,5 +166,7 @@ impl Figure for Optimum {
         };
         let what = "N = B: natural up to 1 dB, {4,6,1} at 2 and 3, {4,5,6} at 4 to 8, Gray above (erratum binary-13)";
         here.all("regimes", what, of(3), |r| r.masks.0 == expected(r.snr_db));
+        let limit = first(&rows.special, |r| r.quantity.contains("at 60 dB")).map(|r| r.value);
+        claims.below("limit-below", "eight sensors tend to it from below", limit, 0.25 * 0.25 / 12.0);
     }
 }

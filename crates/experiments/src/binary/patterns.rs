@@ -258,5 +258,6 @@ impl Figure for Response {
             let nearest = rows.iter().min_by(|a, b| (a.x - *t).abs().total_cmp(&(b.x - *t).abs()));
             nearest.is_some_and(|r| (r.p1 - 0.5).abs() <= 2e-3)
         });
+        claims.all("probabilities", "all values are probabilities", rows, |r| (0.0..=1.0).contains(&r.p1));
     }
 }

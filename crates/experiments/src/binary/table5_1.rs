@@ -121,6 +121,7 @@ impl Figure for Table {
         here.all("best-masks", "the best set is {4,6,3,3,3,3,2,2}", best, |r| r.masks.0 == [2, 2, 3, 3, 3, 3, 4, 6]);
         let what = "the best under the discrete decoder is {1,2,3,3,3,3,4,6}";
         here.all("dmap-masks", what, decoded, |r| r.masks.0 == [1, 2, 3, 3, 3, 3, 4, 6]);
+        claims.all("bound", "the van Trees bound is below every error", &rows.sets, |r| r.van_trees <= r.mse_mmse);
         let what = "equation 5.7 counts multisets once per basis, 1.5 to 18 times too often (erratum binary-2)";
         claims.all("over-count", what, &rows.search_spaces, |r| (1.4..=18.0).contains(&(r.printed / r.exact)));
         let eight = rows.search_spaces.iter().find(|r| (r.bits, r.sensors) == (3, 8));

@@ -131,6 +131,8 @@ impl Figure for Unknowns {
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let paper = claims.at_defaults().at_full_trials();
+        let what = "every further unknown widens the bound";
+        claims.increasing("more-unknowns", what, rows.bounds.iter().map(|b| b.sd_x));
         let bias = |key: &str| find(&rows.models, key);
         let what = "a rate for each sample is metres off without any noise (erratum diffusive-2)";
         paper.above("sample-wise-is-biased", what, bias("sample-wise 20").map(|m| m.bias.value), 1.0);

@@ -59,6 +59,8 @@ impl Figure for KalmanVariance {
             let what = format!("the {scheme} variance increases strictly with |a|");
             here.all(format!("{scheme}-rises-with-a"), what, neighbours, |(low, high)| of(low) < of(high));
         }
+        let what = "the Kalman variance stays below that of one measurement";
+        claims.all("kf-below-one", what, rows, |r| r.kf_reduction < 1.0);
         let what = "the sign-bit filter is nowhere better (erratum dymbo-2)";
         claims.all("dymbo-above-kf", what, rows, |r| r.dymbo_reduction >= r.kf_reduction);
     }

@@ -174,6 +174,18 @@ impl Figure for Convergence {
             let slack = 4.5 * r.informed_nees.error();
             (0.9995 - slack..=1.0030 + slack).contains(&r.informed_nees.value)
         });
+        for curve in rows.chunks(p.steps + 1) {
+            let gamma = curve[0].plant.gamma;
+            let late: Moments = curve
+                .iter()
+                .skip(30)
+                .map(|r| r.dymbo_mse.value / r.dymbo_minf)
+                .collect();
+            let what =
+                format!("gamma = {gamma}: simulated error over n >= 30 is the predicted steady variance within 2 %");
+            here.near(format!("steady-{gamma}"), what, late.mean(), 1.0, 0.02);
+        }
+
         let curves = || rows.chunks(p.steps + 1);
         // The Kalman filter settles on its own variance, the sign-bit filter on its own exact error.
         type Of = fn(&Row) -> f64;

@@ -135,6 +135,8 @@ impl Figure for GapToExact {
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
+        let what = "minimum error and excess add up to the error chain's, at every step";
+        claims.all("adds-up", what, &rows.tree, |r| (r.mmse + r.excess - r.chain_mse).abs() <= 1e-12);
         let of = |bits: usize| rows.steady.iter().filter(move |r| r.bits == bits);
         let what = "the same in percent of the minimum error, at a, gamma";
         claims.keyed("percent", what, of(1), |r| r.excess.scaled(100.0 / r.mmse));

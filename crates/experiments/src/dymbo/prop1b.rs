@@ -75,6 +75,8 @@ impl Figure for PosteriorShape {
         here.decreasing("converges", what, rows.iter().map(|r| r.distance));
         let ratio = rows.windows(2).last().map(|w| w[0].distance / w[1].distance);
         here.near("cubic", "twice the noise, an eighth of the difference (erratum dymbo-11)", ratio, 8.0, 0.01);
+        let constant = rows.last().map(|r| r.cubed);
+        here.near("constant", "constant of the cubic law", constant, 0.0200, 5e-5);
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {

@@ -86,9 +86,10 @@ impl Figure for Fig3 {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let gap = rows.l1("expected").zip(rows.l1("prior")).map(|(e, p)| e - 2.0 * p);
         claims.at_most("twice", "the expected L1 is at most twice the prior's", gap, 0.0);
-        let here = claims.at_defaults();
+        here.below("nothing", "the other answer leaves nothing of it", rows.l1("y0"), 1e-8);
         here.above("largest", "one answer leaves the largest L1 there is, nearly 2", rows.l1("y1"), 1.999);
     }
 

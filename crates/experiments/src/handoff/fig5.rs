@@ -79,8 +79,12 @@ impl Figure for Fig5 {
         })
     }
 
-    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+    fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
         let paper = claims.at_defaults().at_full_trials();
+        for t in &p.time {
+            let total: f64 = rows.particles.iter().filter(|r| r.t == *t).map(|r| r.weight).sum();
+            claims.near(format!("weights-t{t}"), "weights sum to one", total, 1.0, 1e-9);
+        }
         let distance = rows.gaussian.first().map(|d| d.kl.value);
         let what = "the beliefs are far from Gaussian: KL 0.12 nat to the Gaussian of their moments";
         paper.near("gaussian", what, distance, 0.12, 0.03);

@@ -105,5 +105,6 @@ impl Figure for Reductions {
                 paper.below(format!("alternating-m{m}"), "alternating axes lose more than principal axes", gap, 0.0);
             }
         }
+        paper.decreasing("more", "more components lose less", p.components.iter().map(|m| kl("pipeline 15", *m)));
     }
 }

@@ -140,5 +140,11 @@ impl Figure for Table41 {
         here.near("rho85-loss", what, lost, 0.00506, 1e-4);
         let what = "without correlation every random start reaches the same optimum";
         here.all("one-optimum", what, independent(), |s| s.arrived == s.starts);
+        let what = "squared error >= exp(-2 I) for every design";
+        claims.all("shannon", what, designs, |r| r.pair.mse >= (-2.0 * r.pair.mi_nats).exp());
+        let what = "no pair's error is below the van Trees bound";
+        claims.all("van-trees", what, independent(), |s| {
+            minus(mse(s.case, &format!("{} joint", s.criterion)), s.van_trees).is_some_and(|gap| gap > 0.0)
+        });
     }
 }

@@ -106,5 +106,7 @@ impl Figure for Table42 {
         }
         let what = "every random start reaches the same joint optimum";
         here.all("one-optimum", what, &rows.searches, |s| s.arrived == s.starts);
+        let bound = |r: &Row| first(&rows.searches, |s| s.levels == r.levels).map(|s| s.ceo_bound);
+        claims.all("ceo-gap", "no design beats the bound", designs, |r| bound(r).is_some_and(|b| r.design.mse > b));
     }
 }

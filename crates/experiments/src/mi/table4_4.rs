@@ -161,9 +161,14 @@ impl Figure for Table44 {
             let what = "least error < Matusita < mutual information < J-divergence (erratum mi-11)";
             let order = ["pe", "matusita", "mi-joint", "j-divergence"].map(|method| pe(signal, method));
             here.increasing(format!("{signal}-order"), what, order);
+            let others = select(designs, |d| d.signal == signal && d.method != "j-divergence");
+            let worst = pe(signal, "j-divergence").unwrap_or(0.0);
+            here.all(format!("{signal}-j-worst"), "the J-divergence is worst of all", others, |d| d.pe < worst);
         }
         let what = "no change of one sensor improves on the identical minimum (grid of 0.05, dynamic programme)";
         claims.all("person-by-person", what, &rows.checks, |c| c.single_change_gain <= 1e-12);
+        let what = "four levels lose against samples";
+        claims.all("unquantized", what, &rows.checks, |c| pe(c.signal, "pe").is_some_and(|pe| pe > c.unquantized_pe));
         let what =
             "the printed 1.0e-5 at the strong signal is below the best that any design found reaches (erratum mi-11)";
         here.above("too-low", what, pe(4.0, "pe").map(|pe| pe - 1.0e-5), 0.0);

@@ -100,6 +100,8 @@ impl Figure for Table45 {
         here.increasing("mse-prefers-natural", what, error);
         let third = at(0.05, "third", "mse-joint").zip(at(0.05, "gray", "mse-joint"));
         here.above("third-worst", "the third assignment is much worse", third.map(|(a, b)| a.mse - b.mse), 0.04);
+        let natural = select(rows, |r| r.labelling == "natural" && r.design == "mi-joint");
+        here.increasing("worse", "errors grow with the crossover", natural.map(|r| r.pair.mse));
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {

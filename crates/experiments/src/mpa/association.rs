@@ -212,6 +212,7 @@ impl Figure for Fig37 {
 
     fn claims(&self, _: &Parameters, t: &Vec<Step>, claims: &mut Claims) {
         let here = claims.at_defaults();
+        claims.all("probabilities", "rules give probabilities", t, |r| (0.0..=1.0).contains(&r.p0));
         let near = |r: &Step| {
             let to = |x: f64| r.t.map(|t| (x - t).abs()).into_iter().fold(f64::INFINITY, f64::min);
             r.estimate.iter().all(|x| to(*x) < 8.0 * r.variance.sqrt())
@@ -312,5 +313,9 @@ impl Figure for Table {
             let what = "over particles the printed rule blurs the targets";
             full.above(format!("particles-{variance}"), what, ratio, blur);
         }
+        let genie = |r: &Row| first(t, |g| g.variance == r.variance && g.apart == r.apart && g.method == "genie");
+        full.all("genie", "no rule is below the genie", select(t, |r| r.method != "genie"), |r| {
+            genie(r).is_some_and(|g| g.labelled.value <= r.labelled.value)
+        });
     }
 }

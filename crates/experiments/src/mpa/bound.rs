@@ -105,6 +105,11 @@ impl Figure for Bounds {
             let above = |m: Measured| m.value > r.quantized.value - 3.0 * m.error();
             above(r.grid) && above(r.message_passing)
         });
+        claims.all("order", "levels never tell more than ranges", t, |r| r.quantized.value > r.unquantized.value);
+        for snr in SNRS {
+            let of = select(t, |r| r.snr_db == snr).map(|r| r.quantized.value);
+            full.decreasing(format!("levels-{snr}"), "fewer levels, larger bound", of);
+        }
         let loose = first(t, |r| r.snr_db == 50.0 && r.levels == 4);
         full.above("loose", "at 50 dB the bound says little", loose.map(|r| r.grid_median / r.quantized.value), 5.0);
     }

@@ -84,4 +84,10 @@ impl Figure for Leaders {
         };
         SETTINGS.into_iter().map(row).collect()
     }
+
+    fn claims(&self, _: &Parameters, t: &Vec<Row>, claims: &mut Claims) {
+        claims.all("sum", "every step has one, none or several", t, |r| {
+            (r.one.value + r.none.value + r.several.value - 1.0).abs() < 1e-9
+        });
+    }
 }

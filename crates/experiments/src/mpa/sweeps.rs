@@ -96,6 +96,9 @@ impl Figure for Mse {
         full.all("layouts-improved", what, 0..4, |i| {
             over(layout(i, "improved-40"), layout(i, "GMPA-transfer")).is_some_and(|r| r <= 1.15)
         });
+        let growth = over(mse(&t.speeds, "V4 GMPA"), mse(&t.speeds, "V1.5 GMPA"));
+        let what = "the error grows with the square of the speed: a ratio 7.1 of squares gives 5.7";
+        full.near("speed", what, growth, 5.7, 0.8);
     }
 
     fn plot(&self, _: &Effort, t: &Mses) -> Plot {
@@ -155,7 +158,13 @@ impl Figure for Fig34 {
         full.no_more()
             .keyed("lost-most", "share of lost tracks", t, |r| r.score.lost);
         let value = |method: &str| mse(t, &format!("40dB-L4 {method}"));
+        let improved = [10, 20, 40, 100].map(|n| value(&format!("improved-{n}")));
+        full.decreasing("improved", "improved message passing gains from particles up to 100", improved);
         full.above("few", "with three particles it loses the target (erratum mpa-9)", value("improved-3"), 4.0);
+        let guided = [3, 10, 40, 500].map(|n| value(&format!("guided-{n}")));
+        full.decreasing("guided", "guided draws gain, too", guided);
+        let enough = over(value("guided-10"), value("guided-500"));
+        full.at_most("ten", "ten draws are enough for a guided filter: 1.6 of the error of 500", enough, 1.75);
         let gap = over(value("grid-31"), value("EKF-U"));
         full.above("gap", "the gap to unquantized ranges never closes with four levels", gap, 10.0);
     }

@@ -106,6 +106,7 @@ impl Figure for Frontier {
         claims.all("floor", "no scheme that pays for every symbol beats the floor", loud(), |r| {
             r.rmse.value >= slack(&r)
         });
+        claims.all("overhead", "air time is never below payload", rows, |r| r.air.value >= r.payload.value);
         for world in ["scalar", "plane"] {
             let fine = find(world, "all-send", "32 bit", "none");
             let words = |bits: &str, feedback: &str| find(world, "innovation-words", bits, feedback);

@@ -79,6 +79,10 @@ impl Figure for Filters {
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_defaults().at_full_trials();
+        let all = |r: &Row| [r.assumed_density, r.unscented, r.ensemble, r.grid, r.particles];
+        claims.all("finite", "every filter ends every run", rows, |r| {
+            all(r).iter().all(|error| error.value.is_finite())
+        });
         let mild = || select(rows, |r| r.problem != "growth");
         for (name, of) in [
             ("assumed-density", (|r| r.assumed_density_ratio) as fn(&Row) -> Option<f64>),

@@ -146,6 +146,7 @@ impl Figure for Bits {
         claims.at_most("mean", what, geometric_mean(pairs.iter().map(|p| p.ratio)), 0.85);
         claims.at_most("worst", "and nowhere above 1.1 of it", largest(pairs.iter().map(|p| p.ratio)), 1.1);
         let ours = || rows.schemes.iter().filter(|r| r.scheme == "adaptive");
+        claims.all("rate", "the rate is kept", ours(), |r| r.bits <= r.rate);
         let what = "whole packets cost at most a bit each beyond the ideal length";
         let packets = || pairs.iter().zip(ours());
         claims.all("packets", what, packets(), |(p, r)| p.packed <= p.ideal + r.packets);

@@ -79,5 +79,6 @@ impl Figure for Packets {
         let what = "at equal packets the error is at most that of the better DPCM, in the geometric mean";
         claims.at_most("mean", what, geometric_mean(ratios()), 1.0);
         here.at_most("worst", "and nowhere above 1.35 of it", largest(ratios()), 1.35);
+        claims.all("rate", "the rate is kept", rows.iter().filter(|r| r.ratio.is_some()), |r| r.packets <= r.target);
     }
 }

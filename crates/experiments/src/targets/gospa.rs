@@ -125,5 +125,14 @@ impl Figure for Targets {
         }
         // Another program's numbers, which stand beside ours: it knows what ours has to find.
         claims.shown("jpda");
+        let sum = |r: &Row| {
+            [r.localisation, r.missed, r.false_targets]
+                .map(|part| part.value.powi(2))
+                .iter()
+                .sum::<f64>()
+        };
+        claims.all("parts", "the parts sum to the whole", rows, |r| {
+            (sum(r) - r.gospa.value.powi(2)).abs() < 1e-9 * sum(r)
+        });
     }
 }
