@@ -101,6 +101,6 @@ impl Settings {
         self.noise = median(self.found.clone());
         self.world.change = (found.change * self.world.within / self.world.interval).sqrt();
         (self.world.is_learning, self.world.is_lasting) = (false, true);
-        (self.later, self.lasting) = (None, Some(found));
+        (self.later, self.lasting, self.world.open) = (None, Some(found), None);
     }
 }

@@ -59,6 +59,7 @@ mod marks;
 mod meaning;
 mod mistakes;
 mod odometry;
+mod open;
 mod own_columns;
 mod path;
 mod picture;
