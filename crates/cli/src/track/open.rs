@@ -31,8 +31,34 @@ impl Settings {
         }
     }
 
+    /// Finds numbers again from `more` rows, the first ones among them, or those of errors that last. Whether they are others.
+    pub(super) fn find_again(
+        &mut self,
+        (first, more): (&[Instant], &[Instant]),
+        names: &[String],
+        unknown: &Unknown,
+    ) -> bool {
+        let was_lasting = self.lasting.is_some();
+        if unknown.noise && unknown.change && self.find_lasting(more, names) {
+            return true;
+        }
+        // Under errors that last the likelihood of those that do not says nothing.
+        let is_refined = !was_lasting && self.refine((first, more), names, unknown);
+        if is_refined {
+            self.find_openness(more, names, unknown);
+        }
+        is_refined
+    }
+
+    /// What is to be said of the numbers that were found last.
+    pub(super) fn lines_of_found(&self, names: &[String]) -> Vec<String> {
+        let mut lines = self.lasting_lines(names);
+        lines.extend(self.openness_line(names));
+        lines
+    }
+
     /// A line, if the rows leave much open.
-    pub(super) fn openness_line(&self, names: &[String]) -> Option<String> {
+    fn openness_line(&self, names: &[String]) -> Option<String> {
         let open = self.world.open.as_ref().filter(|open| open.of_level > TOLD)?;
         let (what, option) = match open.number.and_then(|sensor| names.get(sensor)) {
             Some(name) => (format!("the noise of {}", say::name(name)), "--noise"),
