@@ -41,6 +41,10 @@ const NO_LEVELS: [&str; 10] = [
     "satellites",
     "sats",
 ];
+/// Names of columns that number rows, or say how a value came about, or when.
+const NUMBERS: [&str; 11] = [
+    "record", "recno", "seq", "status", "flag", "flags", "qc", "quality", "hour", "minute", "weekday",
+];
 /// Words of what is said of a device, or of the level by who sets or predicts it. Beside columns without such words they measure no level.
 const BESIDE: [&[&str]; 3] = [
     &["rssi", "snr", "lqi", "sats", "satellites"],
@@ -279,6 +283,7 @@ impl Roles {
         let measures_none = |name: &&&String| {
             let first = words(name);
             first.first().is_some_and(|word| NO_LEVELS.contains(&word.as_str()))
+                || (first.len() == 1 && has(name, &NUMBERS))
                 || BESIDE.iter().filter(is_beside).any(|those| is_said_beside(name, those))
                 || (is_mean_there && has(name, &ENDS) && !has(name, &MEANS))
         };

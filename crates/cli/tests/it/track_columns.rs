@@ -256,6 +256,7 @@ fn columns_that_say_something_else_are_named() {
     without("time,north,south,Battery (V)", "--without 'Battery (V)'");
     without("time,phone,phone_sats,setpoint", "--without phone_sats,setpoint");
     without("time,t_min,t_mean,t_max", "--without t_min,t_max");
+    without("time,RECORD,value,status", "--without RECORD,status");
     for head in [
         "time,battery_1,battery_2",
         "time,min,max",
@@ -265,4 +266,18 @@ fn columns_that_say_something_else_are_named() {
         let problem = problem(head);
         assert!(!problem.contains("not measure"), "{head}: {problem}");
     }
+}
+
+/// Defect: of a value and its change from row to row the value was left out: bands held no row.
+#[test]
+fn the_change_of_a_column_is_left_out() {
+    let mut last = None;
+    let (table, levels) = walk(121, 0.3, "value,delta", |levels, numbers| {
+        let value = (100.0 * (levels[levels.len() - 1] + 0.2 * numbers.normal())).round() / 100.0;
+        let change = value - last.replace(value).unwrap_or(value);
+        format!("{value:.2},{change:.2}")
+    });
+    let (rows, summary) = tracked_file(&table, &[]);
+    assert!(has_hint(&summary, "delta is the change from row to row of value"), "{summary}");
+    assert!(share(&rows, &levels) > 0.9);
 }
