@@ -4,6 +4,7 @@ use super::estimator::{Estimator, Step, Use};
 use super::instant::{Instant, Qualifier};
 use super::lasting::{ErrorUnderLasting, Lasting};
 use super::meaning::Seat;
+use super::open;
 use super::remote::remote;
 use super::sensors;
 use super::world::World;
@@ -90,6 +91,8 @@ struct Centre<const D: usize, F: StateFilter<D>> {
     period: Option<f64>,
     is_on_change: bool,
     zero: f64,
+    /// Factor of the level's deviation for what the rows leave open of change and noises.
+    open: f64,
     rng: Pcg64Mcg,
     world: ContinuousLinear<D>,
     /// All beliefs, if they are to be smoothed.
@@ -143,6 +146,7 @@ impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
             period: world.period,
             is_on_change: world.is_on_change,
             zero: world.zero,
+            open: world.open.as_ref().map_or(1.0, open::factor),
             rng,
             world: model,
             kept: world.is_smoothed.then(Vec::new),
@@ -290,7 +294,7 @@ impl<const D: usize, F: StateFilter<D>> Estimator for Centre<D, F> {
         let events: Vec<_> = events.filter(is_meant).collect();
         let rejected = events.iter().filter(|(event, _)| *event == "rejected").count();
         let belief = self.centre.estimate();
-        let wider = self.wider(instant, &events, before, &forecast);
+        let wider = self.open * self.wider(instant, &events, before, &forecast);
         self.wider.extend(self.kept.is_some().then_some(wider));
         if let Some(kept) = &mut self.kept {
             kept.push(Filtered {

@@ -43,6 +43,19 @@ const NO_LEVELS: [&str; 10] = [
     "satellites",
     "sats",
 ];
+/// Names of columns that number rows, or say how a value came about, or when.
+const NUMBERS: [&str; 11] = [
+    "record", "recno", "seq", "status", "flag", "flags", "qc", "quality", "hour", "minute", "weekday",
+];
+/// Words of what is said of a device, or of the level by who sets or predicts it. Beside columns without such words they measure no level.
+const BESIDE: [&[&str]; 3] = [
+    &["rssi", "snr", "lqi", "sats", "satellites"],
+    &["battery", "vbat"],
+    &["setpoint", "forecast"],
+];
+/// Ends of what a mean is of.
+const ENDS: [&str; 4] = ["min", "max", "minimum", "maximum"];
+const MEANS: [&str; 4] = ["mean", "avg", "average", "median"];
 /// Words of quantities: columns of two of them measure no common level.
 const QUANTITIES: [&[&str]; 8] = [
     &["lat", "latitude"],
@@ -309,26 +322,45 @@ impl Roles {
             let [one, other] = [one, other].map(|name| crate::say::name(name));
             return Some(format!("columns {one} and {other} do not measure one level: choose with --columns"));
         }
-        let is_one = |name: &&String| {
-            words(name)
-                .first()
-                .is_some_and(|word| NO_LEVELS.contains(&word.as_str()))
+        let all: Vec<&String> = table.names.iter().filter(own).collect();
+        let has = |name: &String, those: &[&str]| words(name).iter().any(|word| those.contains(&word.as_str()));
+        // The temperature of a battery is one.
+        let is_other = |name: &String, those: &[&str]| {
+            let mut others = QUANTITIES.iter().filter(|own| !own.contains(&those[0]));
+            others.any(|own| has(name, own))
         };
-        let name = table
-            .names
+        let is_said_beside = |name: &String, those: &[&str]| has(name, those) && !is_other(name, those);
+        let is_beside = |those: &&&[&str]| !all.iter().all(|name| is_said_beside(name, those));
+        let is_mean_there = all.iter().any(|name| has(name, &MEANS));
+        let measures_none = |name: &&&String| {
+            let first = words(name);
+            first.first().is_some_and(|word| NO_LEVELS.contains(&word.as_str()))
+                || (first.len() == 1 && has(name, &NUMBERS))
+                || BESIDE.iter().filter(is_beside).any(|those| is_said_beside(name, those))
+                || (is_mean_there && has(name, &ENDS) && !has(name, &MEANS))
+        };
+        let those: Vec<String> = all
             .iter()
-            .filter(own)
-            .find(is_one)
-            .filter(|_| table.names.len() > 1)?;
-        let name = crate::say::name(name);
-        let dilution = if name.to_lowercase().ends_with("dop") {
+            .filter(measures_none)
+            .map(|name| crate::say::name(name).into_owned())
+            .collect();
+        if those.is_empty() || all.len() == 1 {
+            return None;
+        }
+        let dilution = if those.iter().any(|name| name.to_lowercase().ends_with("dop")) {
             "; a column of standard deviations, the dilution times the error of a range, is an --accuracy-column"
         } else {
             ""
         };
+        let (word, verb) = if those.len() == 1 {
+            ("column", "does")
+        } else {
+            ("columns", "do")
+        };
         Some(format!(
-            "column {name} does not measure the level: say --without {}{dilution}",
-            as_argument([&name])
+            "{word} {} {verb} not measure the level: say --without {}{dilution}",
+            those.join(", "),
+            as_argument(&those)
         ))
     }
 

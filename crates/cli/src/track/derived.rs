@@ -4,7 +4,7 @@
 //! value(t) = a + sum of b_i times the other columns' values(t) + c times its own last value,  b_i, c >= 0
 //! derived    if that holds within the rounding of all of them, while the values change by far more
 //! ```
-//! Of two columns of which each follows from the other the one behind is left out.
+//! Of two columns of which each follows from the other the one behind is left out, and of a value and its change from row to row (c = 1) the change.
 
 use super::first::values_of;
 use super::groups::{present, whole};
@@ -26,12 +26,16 @@ const EXACT: f64 = 1e-9;
 /// Slack of the rounding, and shares of the deviation below this are none.
 const SLACK: f64 = 1.05;
 const NO_SHARE: f64 = 0.02;
+/// The share of the last value in a sum of changes, but for rounding.
+const WHOLE: f64 = 0.99;
 
 /// What a column is computed from.
 #[derive(Debug)]
 pub(super) struct Derived {
     column: usize,
     from: Vec<usize>,
+    /// It is the change of that column from row to row.
+    is_change: bool,
 }
 
 struct Column {
@@ -67,8 +71,8 @@ fn middle(numbers: impl Iterator<Item = f64>, share: f64) -> f64 {
     numbers.get(at).copied().unwrap_or(f64::INFINITY)
 }
 
-/// The places of those from which a column is computed, itself among them if its last value is.
-fn sources(columns: &[Column], column: usize, others: &[usize], with_own: bool) -> Option<Vec<usize>> {
+/// The places of those from which a column is computed, itself among them if its last value is, and whether it adds them up from row to row.
+fn sources(columns: &[Column], column: usize, others: &[usize], with_own: bool) -> Option<(Vec<usize>, bool)> {
     let own = &columns[column];
     let behind = |one: &Column| Column::centred(&one.values[1..]);
     let target = behind(own);
@@ -97,12 +101,9 @@ fn sources(columns: &[Column], column: usize, others: &[usize], with_own: bool) 
         middle(off.iter().map(|off| off.abs()), share_of_rows) <= allowed && middle(steps, 0.5) >= FAR_MORE * allowed;
     let share = |i: usize| factors[i] * matrix.column(i).norm() / target.norm();
     let is_positive = (0..places.len()).all(|i| share(i) > -NO_SHARE);
-    (holds && is_positive).then(|| {
-        (0..places.len())
-            .filter(|i| share(*i) > NO_SHARE)
-            .map(|i| places[i])
-            .collect()
-    })
+    let is_sum = with_own && factors[others.len()] > WHOLE;
+    let has_share = (0..places.len()).filter(|i| share(*i) > NO_SHARE);
+    (holds && is_positive).then(|| (has_share.map(|i| places[i]).collect(), is_sum))
 }
 
 /// Columns that are computed from those that remain.
@@ -117,6 +118,9 @@ pub(super) fn derived(first: &[Instant], sensors: usize) -> Vec<Derived> {
         .collect();
     let mut found = Vec::new();
     for column in remaining.clone().into_iter().rev() {
+        if !remaining.contains(&column) {
+            continue;
+        }
         let others: Vec<usize> = remaining.iter().copied().filter(|other| *other != column).collect();
         if others.is_empty() {
             break;
@@ -124,10 +128,18 @@ pub(super) fn derived(first: &[Instant], sensors: usize) -> Vec<Derived> {
         let from = [false, true]
             .iter()
             .find_map(|with_own| sources(&columns, column, &others, *with_own));
-        if let Some(from) = from {
-            remaining = others;
-            found.push(Derived { column, from });
-        }
+        let Some((from, is_sum)) = from else { continue };
+        let added: Vec<usize> = from.iter().copied().filter(|other| *other != column).collect();
+        let (column, from, is_change) = match added.as_slice() {
+            [change] if is_sum => (*change, vec![column], true),
+            _ => (column, from, false),
+        };
+        remaining.retain(|other| *other != column);
+        found.push(Derived {
+            column,
+            from,
+            is_change,
+        });
     }
     found
 }
@@ -144,8 +156,13 @@ impl Derived {
             false => say::name(&names[*place]).into_owned(),
         };
         let from: Vec<String> = self.from.iter().map(of).collect();
+        let how = if self.is_change {
+            "is the change from row to row of"
+        } else {
+            "follows from"
+        };
         format!(
-            "{name} follows from {}, to the last digit: it says nothing of its own and is left out, as --without {} does; --noise, --change and --prior \
+            "{name} {how} {}, to the last digit: it says nothing of its own and is left out, as --without {} does; --noise, --change and --prior \
              together keep it",
             from.join(", "),
             as_argument([&name])

@@ -4,11 +4,12 @@ use super::first::values_of;
 use super::groups::groups;
 use super::instant::Instant;
 use super::lags::lags;
-use super::lasting::lasting;
+use super::lasting::{Parts, lasting};
 use super::settings::Settings;
 use crate::arguments::{Model, TrackOptions};
 use crate::numbers::short;
 use crate::report::Report;
+use crate::say;
 use fewbits_filters::calibration::{Number, median};
 
 /// The stated noise is doubted if another explains the rows better by so many nats, and is so many times as large or small.
@@ -73,26 +74,19 @@ impl Settings {
         }
     }
 
-    /// Finds errors of sensors that last from row to row, and the change and noises under them, as far as they may be found.
-    fn find_lasting(&mut self, rows: &[Instant], names: &[String]) {
+    /// Finds errors of sensors that last from row to row, and the change and noises under them, as far as they may be found. Whether there are any.
+    pub(super) fn find_lasting(&mut self, rows: &[Instant], names: &[String]) -> bool {
         let is_plain = |(sensor, name): (usize, &String)| {
             let seat = self.seat(sensor, name);
             seat.sends == Report::Value && !seat.is_stated()
         };
         let is_walk = self.world.model == Model::Walk && self.world.period.is_none() && !self.world.is_on_grid;
         if !is_walk || !names.iter().enumerate().all(is_plain) {
-            return;
+            return false;
         }
         let Some(found) = lasting(rows, names.len()) else {
-            return;
+            return false;
         };
-        for (name, parts) in names.iter().zip(&found.parts).filter(|(_, parts)| parts.lasting > 0.0) {
-            self.hints.push(format!(
-                "{name}: its errors last for several rows (the correlation of {} of their variance with the next row is {}): bands allow for it",
-                short(parts.lasting / (parts.lasting + parts.plain)),
-                short(parts.rho)
-            ));
-        }
         self.found = found
             .parts
             .iter()
@@ -100,7 +94,23 @@ impl Settings {
             .collect();
         self.noise = median(self.found.clone());
         self.world.change = (found.change * self.world.within / self.world.interval).sqrt();
-        (self.world.is_learning, self.world.is_lasting) = (false, true);
-        (self.later, self.lasting) = (None, Some(found));
+        (self.world.is_learning, self.world.is_lasting, self.world.is_followed) = (false, true, false);
+        (self.lasting, self.world.open) = (Some(found), None);
+        true
+    }
+
+    /// A line for each sensor whose errors last.
+    pub(super) fn lasting_lines(&self, names: &[String]) -> Vec<String> {
+        let parts = self.lasting.iter().flat_map(|found| &found.parts);
+        let lasting = names.iter().zip(parts).filter(|(_, parts)| parts.lasting > 0.0);
+        let line = |(name, parts): (&String, &Parts)| {
+            format!(
+                "{}: its errors last for several rows (the correlation of {} of their variance with the next row is {}): bands allow for it",
+                say::name(name),
+                short(parts.lasting / (parts.lasting + parts.plain)),
+                short(parts.rho)
+            )
+        };
+        lasting.map(line).collect()
     }
 }

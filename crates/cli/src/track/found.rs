@@ -3,10 +3,11 @@
 use super::first::{steepest, values, values_of};
 use super::instant::{Instant, Qualifier};
 use super::later::Unknown;
+use super::limits::Ends;
 use super::meaning::Seat;
 use super::settings::Settings;
 use super::world::World;
-use crate::arguments::Model;
+use crate::arguments::{Model, TrackOptions};
 use crate::error::Error;
 use crate::report::Report;
 use fewbits_filters::calibration::{self, Calibration, Number, median, wrapped};
@@ -33,6 +34,9 @@ const LOSS_ALONE: f64 = 5.0;
 
 /// Share of values beyond a limit up to which the mean and the deviation of all say those of the level.
 const MOST_CUT: f64 = 0.05;
+
+/// A value that is rounded is a cell, and no number with more noise, if its step is more than so many deviations of the noise.
+const WIDE_CELL: f64 = 2.0;
 
 /// Least guess of the change, as a share of the noise.
 const LEAST_GUESS: f64 = 0.01;
@@ -196,7 +200,7 @@ impl Settings {
     }
 
     /// Change and noises as far as they are to be found; the others, and all without `unknown`, are known.
-    fn numbers(&self, names: &[String], unknown: Option<&Unknown>) -> (Number, Vec<Number>) {
+    pub(super) fn numbers(&self, names: &[String], unknown: Option<&Unknown>) -> (Number, Vec<Number>) {
         let floor = unknown.map_or(0.0, |unknown| unknown.floor);
         let noise = |(sensor, name): (usize, &String)| {
             let step = self.step_of(sensor);
@@ -339,6 +343,23 @@ impl Settings {
             }
         };
         tests.iter().filter_map(line).collect()
+    }
+
+    /// Whether readings say only on which side of an end a measurement is, or within a cell that is wide beside the noise.
+    pub(super) fn is_cut(&self, options: &TrackOptions, names: &[String]) -> bool {
+        let has_thresholds = options.threshold_column.is_some()
+            || names
+                .iter()
+                .any(|name| self.thresholds.of(name).is_some() && *self.sends.of(name) == Report::Sign);
+        let is_wide = |(sensor, name): (usize, &String)| {
+            let step = self.step_of(sensor).unwrap_or(0.0);
+            step > WIDE_CELL * self.seat(sensor, name).noise
+        };
+        let has_ends = |ends: &Ends| ends.0.is_some() || ends.1.is_some();
+        has_thresholds
+            || self.meaning.has_limits
+            || std::iter::once(&self.meaning.limits).chain(&self.limits).any(has_ends)
+            || names.iter().enumerate().any(is_wide)
     }
 
     /// Finds which sensors round so coarsely that a value is a cell.

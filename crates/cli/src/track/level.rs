@@ -25,7 +25,7 @@ const MAX_EVENTS: usize = 1000;
 /// An event, and its sensor.
 type Happened = (&'static str, Option<usize>);
 
-/// State of a run: both centres, and the counts for the summary.
+/// Both centres, and the counts for the summary.
 struct Run {
     settings: Settings,
     file: String,
@@ -116,7 +116,8 @@ impl Run {
             return Ok(());
         };
         let (rows, (unknown, first)) = (later.add(instant).map(<[_]>::to_vec), later.unknown());
-        if let Some(rows) = rows.filter(|rows| self.settings.refine((&rows[..first], rows), names, unknown)) {
+        let again = rows.filter(|rows| self.settings.find_again((&rows[..first], rows), names, unknown));
+        if let Some(rows) = again {
             let refused = |source: Failure| Error::Refused {
                 what: "the model is refused",
                 source,
@@ -128,12 +129,14 @@ impl Run {
                 .collect();
             let again = |purpose: Use| {
                 let mut centre = centre(&self.settings.world, purpose)?;
+                self.settings.lasting.iter().for_each(|lasting| centre.under(lasting));
                 seats.iter().try_for_each(|seat| centre.join(seat.clone()))?;
                 rows.iter().try_for_each(|row| centre.step(row).map(|_| ()))?;
                 Ok(centre)
             };
             self.centre = again(self.purpose).map_err(refused)?;
-            self.followed = self.followed.take().map(|_| Followed::default());
+            let followed = self.followed.take().filter(|_| self.settings.lasting.is_none());
+            self.followed = followed.map(|_| Followed::default());
             if self.full.is_some() {
                 self.full = Some(again(Use::Comparison).map_err(refused)?);
             }
@@ -370,16 +373,14 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
         run.summary.hints.push(hint.to_owned());
     }
     run.summary.hints.extend(instants.strange_accuracies());
+    run.summary.hints.extend(run.settings.lines_of_found(&instants.names));
     let changes = |followed: &Followed| followed.hints(&run.settings, &instants.names);
     run.summary.hints.extend(run.followed.iter().flat_map(changes));
-    let has_changed = |sensor: usize| {
-        run.followed
-            .as_ref()
-            .is_some_and(|followed| followed.has_changed(sensor))
-    };
+    let followed = run.followed.as_ref();
+    let has_changed = |sensor: usize| followed.is_some_and(|followed| followed.has_changed(sensor));
     run.summary.hints.extend(turning.hints(&instants.names, has_changed));
-    let lines_of = |stuck: &Stuck| stuck.hints(&instants.names);
-    run.summary.hints.extend(stuck.iter().flat_map(lines_of));
+    let stuck = stuck.iter().flat_map(|stuck| stuck.hints(&instants.names));
+    run.summary.hints.extend(stuck);
     let (summary, picture) = run.finish(options)?;
     if let Some(path) = &options.plot {
         picture.save(path)?;

@@ -63,6 +63,7 @@ mod marks;
 mod meaning;
 mod mistakes;
 mod odometry;
+mod open;
 mod own_columns;
 mod path;
 mod picture;

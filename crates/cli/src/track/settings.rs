@@ -33,9 +33,6 @@ const FEWEST_VALUES: usize = 30;
 /// Smallest and largest assumed share of lost reports.
 const LOSS: (f64, f64) = (0.02, 0.5);
 
-/// A value that is rounded is a cell, and no number with more noise, if its step is more than so many deviations of the noise.
-const WIDE_CELL: f64 = 2.0;
-
 const NO_VALUES: &str = "it cannot be found from reports of few bits";
 
 /// All settings of a centre for a level.
@@ -46,14 +43,14 @@ pub(super) struct Settings {
     pub(super) found: Vec<f64>,
     /// Noise of all other sensors for which none is stated.
     pub(super) noise: f64,
-    sends: PerColumn<Report>,
-    thresholds: PerColumn<Option<f64>>,
+    pub(super) sends: PerColumn<Report>,
+    pub(super) thresholds: PerColumn<Option<f64>>,
     /// Per sensor, as far as the first rows go.
     losses: Vec<f64>,
     pub(super) offsets: Vec<f64>,
     pub(super) meaning: Meaning,
     /// Detection limits that are found from the first rows: of each sensor.
-    limits: Vec<limits::Ends>,
+    pub(super) limits: Vec<limits::Ends>,
     /// Step of rounding, if it is found from the first rows: of each sensor.
     pub(super) steps: Vec<Option<f64>>,
     /// Whether a model with a slope explains the first rows far better.
@@ -244,6 +241,7 @@ impl Settings {
                 is_followed: false,
                 is_lasting: false,
                 zero: 0.0,
+                open: None,
                 is_learning: options
                     .learning
                     .map_or(asked_change.is_none(), |learning| learning == Switch::On),
@@ -308,13 +306,12 @@ impl Settings {
             } else {
                 MOST_FIRST
             };
-            if instants.is_live() {
+            let more = &more[..more.len().min(most)];
+            let (is_live, names) = (instants.is_live(), &instants.names);
+            let is_refined = !is_live && more.len() > first.len() && settings.refine((&first, more), names, &unknown);
+            settings.find_openness(if is_refined { more } else { &first }, names, &unknown);
+            if is_live {
                 settings.later = Some(Later::new(unknown, first.len(), most));
-            } else {
-                let more = &more[..more.len().min(most)];
-                if more.len() > first.len() {
-                    settings.refine((&first, more), &instants.names, &unknown);
-                }
             }
         }
         if !options.reports && !instants.has_samples() {
@@ -352,23 +349,6 @@ impl Settings {
             settings.hints.extend(settings.repeating(&first, &instants.names));
         }
         Ok(settings)
-    }
-
-    /// Whether readings say only on which side of an end a measurement is, or within a cell that is wide beside the noise.
-    fn is_cut(&self, options: &TrackOptions, names: &[String]) -> bool {
-        let has_thresholds = options.threshold_column.is_some()
-            || names
-                .iter()
-                .any(|name| self.thresholds.of(name).is_some() && *self.sends.of(name) == Report::Sign);
-        let is_wide = |(sensor, name): (usize, &String)| {
-            let step = self.step_of(sensor).unwrap_or(0.0);
-            step > WIDE_CELL * self.seat(sensor, name).noise
-        };
-        let has_ends = |ends: &limits::Ends| ends.0.is_some() || ends.1.is_some();
-        has_thresholds
-            || self.meaning.has_limits
-            || std::iter::once(&self.meaning.limits).chain(&self.limits).any(has_ends)
-            || names.iter().enumerate().any(is_wide)
     }
 
     pub(super) fn seat_with(&self, sensor: usize, sends: Report, noise: f64, threshold: Option<f64>) -> Seat {

@@ -3,12 +3,36 @@
 use crate::arguments::Model;
 use fewbits_core::Gaussian;
 use fewbits_filters::Error as FilterError;
-use fewbits_filters::calibration::{self, Calibration, Level, Number};
+use fewbits_filters::calibration::{self, Calibration, Level, Number, Openness};
 use fewbits_models::ContinuousLinear;
 use nalgebra::{SMatrix, SVector};
 
 /// Standard deviation of an unknown slope, in multiples of the change per time.
 const STEEPEST: f64 = 10.0;
+
+/// Calls a method of the level under the model of a world, whose change is guessed.
+macro_rules! of_level {
+    ($world:expr, $guess:expr, |$level:ident| $call:expr) => {{
+        let (period, own) = ($world.period, $world);
+        match own.model {
+            Model::Velocity => {
+                let (world, prior) = (|change| own.velocity(change), &own.start($guess)?);
+                let $level = Level { world, prior, period };
+                $call
+            }
+            Model::Acceleration => {
+                let (world, prior) = (|change| own.acceleration(change), &own.start($guess)?);
+                let $level = Level { world, prior, period };
+                $call
+            }
+            _ => {
+                let (world, prior) = (|change| own.walk(change), &own.start::<1>($guess)?);
+                let $level = Level { world, prior, period };
+                $call
+            }
+        }
+    }};
+}
 
 /// Model of the level.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,6 +61,8 @@ pub(super) struct World {
     pub(super) is_lasting: bool,
     /// Standard deviation of what the offsets that were found shift all values.
     pub(super) zero: f64,
+    /// What the rows leave open of the change and the noises that were found from them.
+    pub(super) open: Option<Openness>,
     /// Whether readings cut the belief so that it is no Gaussian: it is then followed on a grid.
     pub(super) is_on_grid: bool,
     /// Whether values are sent on change only.
@@ -91,25 +117,25 @@ impl World {
         guess: f64,
         noises: &[Number],
     ) -> Result<Calibration, FilterError> {
-        let period = self.period;
-        match self.model {
-            Model::Velocity => {
-                let (world, prior) = (|change| self.velocity(change), &self.start(guess)?);
-                Level { world, prior, period }.calibrate(instants, change, noises)
-            }
-            Model::Acceleration => {
-                let (world, prior) = (|change| self.acceleration(change), &self.start(guess)?);
-                Level { world, prior, period }.calibrate(instants, change, noises)
-            }
-            _ => {
-                let (world, prior) = (|change| self.walk(change), &self.start(guess)?);
-                let level = Level { world, prior, period };
-                if self.is_on_grid && self.is_on_change {
-                    level.calibrate_on_grid(instants, change, noises)
-                } else {
-                    level.calibrate(instants, change, noises)
-                }
-            }
+        if self.is_on_grid && self.is_on_change && !matches!(self.model, Model::Velocity | Model::Acceleration) {
+            let (world, prior) = (|change| self.walk(change), &self.start(guess)?);
+            let level = Level {
+                world,
+                prior,
+                period: self.period,
+            };
+            return level.calibrate_on_grid(instants, change, noises);
         }
+        of_level!(self, guess, |level| level.calibrate(instants, change, noises))
+    }
+
+    /// What the values leave open of the numbers that were found from them, which are the guesses.
+    pub(super) fn openness(
+        &self,
+        instants: &[calibration::Instant],
+        change: Number,
+        noises: &[Number],
+    ) -> Result<Option<Openness>, FilterError> {
+        of_level!(self, self.change, |level| level.openness(instants, change, noises))
     }
 }

@@ -50,6 +50,11 @@ impl<B: Clone> Beliefs<B> {
         }
     }
 
+    /// The belief of a level that has not jumped.
+    pub(crate) fn main(&self) -> &B {
+        &self.main
+    }
+
     /// Predicts each.
     pub(crate) fn predict<E>(&mut self, predict: impl Fn(&mut B) -> Result<(), E>) -> Result<(), E> {
         predict(&mut self.main)?;

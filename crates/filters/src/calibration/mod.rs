@@ -14,11 +14,13 @@ mod jumps;
 mod many;
 mod offsets;
 mod on_grid;
+mod open;
 mod reading;
 mod search;
 
 pub(crate) use jumps::{Beliefs, InstantLikelihood};
 pub use offsets::{median, offsets, shift_deviation};
+pub use open::Openness;
 pub use reading::Reading;
 pub use search::Number;
 
@@ -129,16 +131,8 @@ where
         self.search(instants, change, noises, Self::log_likelihood, true)
     }
 
-    /// The search by a likelihood of all instants, given the range of the values, the change and the noises. `is_gaussian`: so that each of many
-    /// sensors can be found beside the others.
-    fn search(
-        &self,
-        instants: &[Instant],
-        change: Number,
-        noises: &[Number],
-        log_likelihood: impl Fn(&Self, &[Instant], f64, f64, &[f64]) -> Option<f64>,
-        is_gaussian: bool,
-    ) -> Result<Calibration, Error> {
+    /// Number of readings of each sensor, and the range of all.
+    fn checked(&self, instants: &[Instant], change: Number, noises: &[Number]) -> Result<(Vec<usize>, f64), Error> {
         change.check("change")?;
         noises.iter().try_for_each(|noise| noise.check("noises"))?;
         let mut counts = vec![0_usize; noises.len()];
@@ -160,10 +154,23 @@ where
         if !is_wide {
             return refuse("values", "all equal", "values that vary");
         }
-        let range = self.period.unwrap_or(high - low);
         if let Some(pair) = instants.windows(2).find(|pair| pair[1].seconds < pair[0].seconds) {
             return refuse("seconds", pair[1].seconds, format!("{} or later", pair[0].seconds));
         }
+        Ok((counts, self.period.unwrap_or(high - low)))
+    }
+
+    /// The search by a likelihood of all instants, given the range of the values, the change and the noises. `is_gaussian`: so that each of many
+    /// sensors can be found beside the others.
+    fn search(
+        &self,
+        instants: &[Instant],
+        change: Number,
+        noises: &[Number],
+        log_likelihood: impl Fn(&Self, &[Instant], f64, f64, &[f64]) -> Option<f64>,
+        is_gaussian: bool,
+    ) -> Result<Calibration, Error> {
+        let (counts, range) = self.checked(instants, change, noises)?;
         let log_likelihood = |change: f64, noises: &[f64]| {
             let found = log_likelihood(self, instants, range, change, noises);
             found.unwrap_or(f64::NEG_INFINITY)
@@ -241,9 +248,14 @@ where
     }
 
     fn log_likelihood(&self, instants: &[Instant], range: f64, change: f64, noises: &[f64]) -> Option<f64> {
+        Some(self.pass(instants, range, change, noises)?.0)
+    }
+
+    /// `ln p` of all readings, and the mean over the instants of the logarithm of the level's deviation given the readings up to each.
+    fn pass(&self, instants: &[Instant], range: f64, change: f64, noises: &[f64]) -> Option<(f64, f64)> {
         let world = (self.world)(change).ok()?;
         let mut beliefs = Beliefs::new(*self.prior);
-        let mut total = 0.0;
+        let (mut total, mut deviations) = (0.0, 0.0);
         let mut steps = Steps::new(&world, instants.first()?.seconds);
         for instant in instants {
             if let Some(step) = steps.to(instant.seconds).ok()? {
@@ -259,8 +271,9 @@ where
                 Ok(())
             };
             total += beliefs.update(instant.seconds, update, widen).ok()?.0;
+            deviations += 0.5 * beliefs.main().covariance()[(0, 0)].ln();
         }
-        (!total.is_nan()).then_some(total)
+        (!total.is_nan()).then_some((total, deviations / instants.len() as f64))
     }
 
     /// Takes in the readings of an instant; `None` if numbers run out of range. `each`: the belief of the level before a reading, and the probability

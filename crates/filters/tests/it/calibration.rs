@@ -456,3 +456,42 @@ fn jumps_that_one_sensor_sees_are_no_change_on_a_grid() {
     let moments = level.calibrate(&instants, UNKNOWN, &noises).unwrap();
     assert!((found.log_likelihood - moments.log_likelihood).abs() < 1.0, "{found:?} {moments:?}");
 }
+
+/// Of a level that hardly moves, `n` readings tell the logarithm of the noise with a deviation of `1 / sqrt(2 n)`, and the level's deviation is a share
+/// of the noise. What may be wild tells a little less. A noise far below the change is left open.
+#[test]
+fn what_readings_leave_open_is_that_of_their_information() {
+    let prior = Gaussian::scalar(20.0, 100.0).unwrap();
+    let level = Level {
+        world: |change: f64| ContinuousLinear::random_walk(change * change),
+        prior: &prior,
+        period: None,
+    };
+    let of = |noise: f64| Number::Unknown {
+        guess: noise,
+        least: 0.0,
+    };
+    for rows in [100, 400] {
+        let instants = recorded(61, 1e-6, &[0.5], &[], rows);
+        let noise = found(&instants, &[UNKNOWN]).noises[0];
+        let open = level
+            .openness(&instants, Number::Known(1e-6), &[of(noise)])
+            .unwrap()
+            .unwrap();
+        let expected = 1.0 / (1.0 + 2.0 * f64::from(rows)).sqrt();
+        assert!((open.of_number / expected - 1.0).abs() < 0.2, "{open:?} {expected}");
+        assert!((open.of_level / expected - 1.0).abs() < 0.2, "{open:?} {expected}");
+        assert_eq!(open.number, Some(0));
+        assert_eq!(
+            level
+                .openness(&instants, Number::Known(1e-6), &[Number::Known(noise)])
+                .unwrap(),
+            None
+        );
+    }
+    let instants = recorded(62, 1.0, &[0.05, 3.0], &[], 200);
+    let numbers = found(&instants, &[UNKNOWN; 2]);
+    let noises = [of(numbers.noises[0]), of(numbers.noises[1])];
+    let open = level.openness(&instants, of(numbers.change), &noises).unwrap().unwrap();
+    assert!(open.of_level > 0.25 && open.number == Some(0), "{open:?}");
+}
