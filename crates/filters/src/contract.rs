@@ -19,6 +19,20 @@ pub(crate) fn condition_all<const D: usize>(
     Ok((next, log_likelihood))
 }
 
+/// The time update of a Gaussian, if its moments are numbers.
+pub(crate) fn predicted<const D: usize>(
+    dynamics: &dyn GaussianDynamics<D>,
+    belief: &Gaussian<D>,
+) -> Result<Gaussian<D>, Error> {
+    let found = dynamics.predict(belief, 1.0);
+    let what = "the predicted belief (from the process noise)";
+    if found.is_finite() {
+        Ok(found)
+    } else {
+        Err(Error::NotANumber { what })
+    }
+}
+
 /// Results of an update other than the new belief.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
@@ -150,7 +164,7 @@ impl<const D: usize> StateFilter<D> for MomentFilter {
         dynamics: &dyn GaussianDynamics<D>,
         belief: &mut Gaussian<D>,
     ) -> Result<(), Error> {
-        *belief = dynamics.predict(belief, 1.0);
+        *belief = predicted(dynamics, belief)?;
         Ok(())
     }
 

@@ -13,7 +13,7 @@ pub use recorded::{Filtered, smooth};
 use crate::{Error, kalman};
 use fewbits_core::{Gaussian, GaussianDynamics, LinearDynamics};
 use fewbits_numerics::linalg::solve_semidefinite;
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
 
 /// One backward step: the smoothed belief at `n`, from the filtered belief at `n` and the smoothed belief at `n + 1`.
 ///
@@ -25,7 +25,7 @@ use nalgebra::SMatrix;
 /// ```
 ///
 /// # Errors
-/// If a covariance is not symmetric positive semidefinite.
+/// If a covariance is not symmetric positive semidefinite, or a moment of the result not finite.
 pub fn smooth_step<const D: usize>(
     dynamics: &impl LinearDynamics<D>,
     filtered: &Gaussian<D>,
@@ -37,10 +37,21 @@ pub fn smooth_step<const D: usize>(
     // A sum of positive semidefinite terms, equal to M + C (next P - P+) C', in which nothing cancels.
     let keep = SMatrix::<f64, D, D>::identity() - gain * transition;
     let future = smoothed_next.covariance() + dynamics.noise_covariance();
-    Ok(Gaussian::from_trusted_parts(
+    finite(
         filtered.mean() + gain * (smoothed_next.mean() - predicted.mean()),
         keep * filtered.covariance() * keep.transpose() + gain * future * gain.transpose(),
-    ))
+    )
+}
+
+/// The belief with these moments, if they are numbers.
+fn finite<const D: usize>(mean: SVector<f64, D>, covariance: SMatrix<f64, D, D>) -> Result<Gaussian<D>, Error> {
+    let found = Gaussian::from_trusted_parts(mean, covariance);
+    let what = "a smoothed moment";
+    if found.is_finite() {
+        Ok(found)
+    } else {
+        Err(Error::NotANumber { what })
+    }
 }
 
 /// The same along any dynamics with Gaussian noise: [`smooth_step`] with the dynamics linearised at the filtered mean, exact if they are linear.
@@ -56,19 +67,14 @@ pub(crate) fn smooth_along<const D: usize>(
     let transition: SMatrix<f64, D, D> = dynamics.jacobian(mean);
     let noise = dynamics.noise_covariance_at(mean);
     let predicted = transition * covariance * transition.transpose() + noise;
-    let predicted = (predicted + predicted.transpose()) * 0.5;
+    let predicted = predicted * 0.5 + predicted.transpose() * 0.5;
     let gain = solve_semidefinite(&predicted, &(transition * covariance))?.transpose();
     // A sum of positive semidefinite terms, in which nothing cancels.
     let keep = SMatrix::<f64, D, D>::identity() - gain * transition;
     let future = smoothed_next.covariance() + noise;
     let found = keep * covariance * keep.transpose() + gain * future * gain.transpose();
     let next = mean + gain * (smoothed_next.mean() - dynamics.mean(mean));
-    if !next.iter().chain(found.iter()).all(|number| number.is_finite()) {
-        return Err(Error::NotANumber {
-            what: "a smoothed moment",
-        });
-    }
-    Ok(Gaussian::from_trusted_parts(next, (found + found.transpose()) * 0.5))
+    finite(next, found * 0.5 + found.transpose() * 0.5)
 }
 
 #[cfg(test)]
