@@ -28,8 +28,14 @@ impl<const M: usize> From<CensoringRule<M>> for Ellipsoid<M> {
 
 impl<const M: usize> From<Ellipsoid<M>> for CensoringRule<M> {
     fn from(region: Ellipsoid<M>) -> Self {
+        let (threshold, variance) = (region.threshold(), region.innovation_covariance()[(0, 0)]);
+        let square = threshold * variance;
         Self {
-            half_width: (region.threshold() * region.innovation_covariance()[(0, 0)]).sqrt(),
+            half_width: if square.is_finite() {
+                square.sqrt()
+            } else {
+                threshold.sqrt() * variance.sqrt()
+            },
             region,
         }
     }

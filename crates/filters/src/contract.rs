@@ -7,6 +7,20 @@ use crate::Error;
 use fewbits_core::{Belief, Gaussian, GaussianDynamics, Likelihood};
 use rand::Rng;
 
+/// The time update of a Gaussian, if its moments are numbers.
+pub(crate) fn predicted<const D: usize>(
+    dynamics: &dyn GaussianDynamics<D>,
+    belief: &Gaussian<D>,
+) -> Result<Gaussian<D>, Error> {
+    let found = dynamics.predict(belief, 1.0);
+    let what = "the predicted belief (from the process noise)";
+    if found.is_finite() {
+        Ok(found)
+    } else {
+        Err(Error::NotANumber { what })
+    }
+}
+
 /// Results of an update other than the new belief.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
@@ -138,7 +152,7 @@ impl<const D: usize> StateFilter<D> for MomentFilter {
         dynamics: &dyn GaussianDynamics<D>,
         belief: &mut Gaussian<D>,
     ) -> Result<(), Error> {
-        *belief = dynamics.predict(belief, 1.0);
+        *belief = predicted(dynamics, belief)?;
         Ok(())
     }
 

@@ -20,6 +20,8 @@ pub(crate) struct Resolution {
     resolved: f64,
     /// A finer grid covers the nodes with more than this share of the largest posterior.
     covered: f64,
+    /// If the posterior has more than this share of its peak at an end, it is that of the belief's moments.
+    end: f64,
 }
 
 /// That of a filter.
@@ -31,6 +33,7 @@ pub(crate) const FINE: Resolution = Resolution {
     cut: 1e-13,
     resolved: 16.0,
     covered: 1e-12,
+    end: 1e-6,
 };
 
 /// That of a search, which computes the likelihood of a whole table some hundred times.
@@ -42,6 +45,7 @@ pub(crate) const QUICK: Resolution = Resolution {
     cut: 1e-7,
     resolved: 5.0,
     covered: 1e-6,
+    end: 1e-2,
 };
 
 /// Largest distance between nodes at which the shape of the dynamics' noise is spread over nodes, in its deviations.
@@ -194,7 +198,7 @@ pub(crate) fn mixed(one: &PointMass, other: &PointMass, share: f64) -> Result<Po
 pub(crate) fn start(law: &Gaussian<1>, Resolution { nodes, reach, .. }: &Resolution) -> Result<PointMass, Error> {
     let (mean, deviation) = (law.mean()[0], law.covariance()[0].sqrt());
     // What is known for certain is a grid of no width that matters.
-    let deviation = deviation.max(1e-9 * mean.abs()).max(f64::MIN_POSITIVE.sqrt());
+    let deviation = deviation.max(1e-12 * mean.abs()).max(f64::MIN_POSITIVE.sqrt());
     let half = 0.5 * (*nodes as f64 - 1.0);
     let step = reach / half;
     let masses = (0..*nodes).map(|i| (-0.5 * ((i as f64 - half) * step).powi(2)).exp());
@@ -236,7 +240,8 @@ pub(crate) fn predicted(
     moved.with_noise(noise[0], resolution).belief()
 }
 
-/// The posterior on a grid that resolves it, and the log-likelihood of the observations.
+/// The posterior on a grid that resolves it, and the log-likelihood of the observations. What is too far from the belief for its grid conditions a
+/// Gaussian of its moments.
 pub(crate) fn updated(
     belief: &PointMass,
     observed: &[&dyn Likelihood<1>],
@@ -247,6 +252,7 @@ pub(crate) fn updated(
         cut,
         resolved,
         covered,
+        end,
         ..
     } = *resolution;
     let mut prior = belief.clone();
@@ -258,7 +264,13 @@ pub(crate) fn updated(
         let log_likelihood = posterior.update(observed)?;
         let (density, h) = (posterior.density(), posterior.grid().spacing());
         let squares: f64 = density.iter().map(|p| (p * h).powi(2)).sum();
-        let least = covered * density.iter().copied().fold(0.0, f64::max);
+        let peak = density.iter().copied().fold(0.0, f64::max);
+        if pass == 0 && density[0].max(density[density.len() - 1]) > end * peak {
+            let mut moments = Gaussian::new(Belief::mean(belief), belief.covariance())?;
+            let evidence = observed.condition(&mut moments)?;
+            return Ok((start(&moments, resolution)?, evidence.log_likelihood));
+        }
+        let least = covered * peak;
         let is_covered = |p: &f64| *p > least;
         let low = density.iter().position(is_covered).unwrap_or(0).saturating_sub(BESIDE);
         let high = density.iter().rposition(is_covered).unwrap_or(0) + BESIDE;

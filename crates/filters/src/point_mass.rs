@@ -25,6 +25,7 @@ use rand::Rng;
 /// predict:  nodes x <- f(mean) + F (x - mean), then the sum with N(0, Q)
 /// update:   p(x) <- p(x) p(observed | x) / evidence, on a finer grid until the posterior is resolved
 /// ```
+/// If the posterior reaches an end of the grid, it is that of a Gaussian of the belief's moments.
 #[derive(Debug, Clone)]
 pub struct PointMassFilter(Region);
 

@@ -112,9 +112,11 @@ impl<const D: usize> RootGaussian<D> {
         Ok(())
     }
 
-    /// Whether all numbers are finite.
+    /// Whether mean and covariance are finite.
     pub(crate) fn is_finite(&self) -> bool {
-        self.mean.iter().chain(self.lower.iter()).all(|x| x.is_finite())
+        // Sums of squares: they are infinite first on the diagonal.
+        let variances = (0..D).map(|d| self.lower.row(d).norm_squared());
+        self.mean.iter().copied().chain(variances).all(f64::is_finite)
     }
 }
 

@@ -20,7 +20,7 @@ pub struct ScalarSteadyState {
 /// positive root of `A p^2 + B p - g = 0`, `A = 1 - a^2 (1 - c)`, `B = 1 - g - a^2`, computed without cancellation.
 ///
 /// # Errors
-/// If `q < 0`, `r <= 0`, or `c` is outside `[0, 1]`; [`Error::NoSteadyState`] if the recursion diverges.
+/// If `q < 0`, `r <= 0`, or `c` is outside `[0, 1]`; [`Error::NoSteadyState`] if the recursion diverges or a variance overflows.
 pub fn scalar_steady_state(
     coefficient: f64,
     process_variance: f64,
@@ -39,12 +39,19 @@ pub fn scalar_steady_state(
     } else {
         (root - linear) / (2.0 * leading)
     };
-    if leading <= 0.0 || !p.is_finite() {
+    let predicted_variance = r * p;
+    if leading <= 0.0 || !predicted_variance.is_finite() {
         return Err(Error::NoSteadyState);
     }
+    let kept = 1.0 + (1.0 - c) * p;
+    let product = predicted_variance * kept;
     Ok(ScalarSteadyState {
-        predicted_variance: r * p,
-        filtered_variance: r * p * (1.0 + (1.0 - c) * p) / (1.0 + p),
+        predicted_variance,
+        filtered_variance: if product.is_finite() {
+            product / (1.0 + p)
+        } else {
+            predicted_variance * (kept / (1.0 + p))
+        },
     })
 }
 
@@ -71,6 +78,9 @@ mod tests {
         let small = at(0.5, 1e-14, 1.0).predicted_variance;
         assert!((small / (1e-14 / 0.75) - 1.0).abs() < 1e-12);
         assert!((at(0.9, 1e200, 1.0).filtered_variance - 1.0).abs() < 1e-12);
+        // The variance before a message is finite, and its square is not.
+        assert!((at(0.0, 1e200, 0.25).filtered_variance / 0.75e200 - 1.0).abs() < 1e-12);
+        assert_eq!(scalar_steady_state(0.99, 1e307, 1e307, 0.0), Err(Error::NoSteadyState));
         for bad in [
             (f64::NAN, 1.0, 1.0, 1.0),
             (0.5, -1.0, 1.0, 1.0),

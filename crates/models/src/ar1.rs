@@ -88,12 +88,13 @@ impl Ar1 {
     /// Variance of the stationary distribution, `q / (1 - a^2)`.
     ///
     /// # Errors
-    /// [`Error::NoSteadyState`] for `|a| >= 1`.
+    /// [`Error::NoSteadyState`] for `|a| >= 1`, or if it overflows.
     pub fn stationary_variance(&self) -> Result<f64, Error> {
         let a = self.coefficient();
-        if a.abs() < 1.0 {
-            // The factored form keeps the digits of 1 - a^2 for |a| near 1.
-            Ok(self.noise_variance() / ((1.0 - a) * (1.0 + a)))
+        // The factored form keeps the digits of 1 - a^2 for |a| near 1.
+        let variance = self.noise_variance() / ((1.0 - a) * (1.0 + a));
+        if a.abs() < 1.0 && variance.is_finite() {
+            Ok(variance)
         } else {
             Err(Error::NoSteadyState)
         }
@@ -175,6 +176,7 @@ mod tests {
             assert!(matches!(Ar1::new_unstable(a, q), Err(Error::Argument(_))));
         }
         assert_eq!(Ar1::new(1.0, 1.0).unwrap().stationary_variance(), Err(Error::NoSteadyState));
+        assert_eq!(Ar1::new(0.99, 1e307).unwrap().stationary_variance(), Err(Error::NoSteadyState));
     }
 
     #[test]

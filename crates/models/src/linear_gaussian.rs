@@ -55,7 +55,7 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
     /// The model with transition `F` (D x D), noise gain `G` (D x U) and noise variances `q` (U).
     ///
     /// # Errors
-    /// If an entry is not finite, or a variance is negative.
+    /// If an entry is not finite, a variance is negative, or the noise covariance overflows.
     pub fn new(
         transition: SMatrix<f64, D, D>,
         gain: SMatrix<f64, D, U>,
@@ -66,7 +66,12 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
         for &variance in noise_variances.iter() {
             non_negative("noise_variances", variance)?;
         }
-        Ok(Self::from_checked(transition, gain, noise_variances))
+        let model = Self::from_checked(transition, gain, noise_variances);
+        if !model.noise_covariance.iter().all(|entry| entry.is_finite()) {
+            let expected = "variances whose noise covariance is finite";
+            return refuse("noise_variances", format!("{:?}", noise_variances.as_slice()), expected);
+        }
+        Ok(model)
     }
 
     pub(crate) fn from_checked(
@@ -123,7 +128,7 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
             }
             let left = power.amax();
             if left < f64::MIN_POSITIVE {
-                return Ok((sum + sum.transpose()) * 0.5);
+                return Ok(sum * 0.5 + sum.transpose() * 0.5);
             }
             if !left.is_finite() {
                 break;
@@ -270,5 +275,7 @@ mod tests {
         assert!(LinearGaussian::new(Matrix1::new(f64::NAN), one, Vector1::new(1.0)).is_err());
         assert!(LinearGaussian::new(one, one, Vector1::new(-1.0)).is_err());
         assert!(LinearGaussian::with_covariance(one, Matrix1::new(-1.0)).is_err());
+        let error = LinearGaussian::new(one, Matrix1::new(1e154), Vector1::new(2.0)).unwrap_err();
+        assert!(error.to_string().contains("noise_variances"), "{error}");
     }
 }

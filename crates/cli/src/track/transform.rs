@@ -10,6 +10,8 @@ use clap::ValueEnum;
 
 /// Triples of values from which it is told whether the noise grows, at least.
 const FEWEST: usize = 40;
+/// Different values, at least: the noise of coarsely rounded values depends on where the level is between two steps.
+const FEWEST_VALUES: usize = 16;
 /// Deviations of the rank correlation of noise and level: by chance of one sensor in 1,500.
 const CORRELATED: f64 = 3.2;
 /// The same of each half of the values.
@@ -96,7 +98,10 @@ impl Transform {
         if values.iter().all(|value| value.fract() == 0.0) && is_count(low) && is_count(high) {
             return Some(Self::Root);
         }
-        if !is_growing {
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        sorted.dedup();
+        if !is_growing || sorted.len() < FEWEST_VALUES {
             return None;
         }
         let growth = |of: fn(&Triple) -> f64| (mean(high, of) / mean(low, of)).ln();
@@ -145,4 +150,42 @@ fn correlation(triples: &[Triple]) -> f64 {
     let (levels, noises) = (ranks(|one| one.level), ranks(|one| one.noise));
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     product(&levels, &noises) / (product(&levels, &levels) * product(&noises, &noises)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Transform;
+
+    /// Normal numbers, nearly: sums of twelve.
+    fn noise(count: usize) -> Vec<f64> {
+        let mut state = 1_u64;
+        let mut uniform = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as f64 / 2.0_f64.powi(31)
+        };
+        (0..count)
+            .map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0)
+            .collect()
+    }
+
+    /// Defect: of a sensor that rounds to steps of five times its noise, the noise was said to grow.
+    #[test]
+    fn rounding_is_no_growth_of_the_noise() {
+        let levels = |k: usize| 19.75 + 0.75 * (k as f64 / 20.0).sin();
+        let rounded: Vec<f64> = noise(600)
+            .iter()
+            .enumerate()
+            .map(|(k, e)| (levels(k) + 0.2 * e).round())
+            .collect();
+        assert_eq!(Transform::suggested(&rounded), None);
+        let growing = |k: usize| 20.0 + 15.0 * (k as f64 / 20.0).sin();
+        let values: Vec<f64> = noise(600)
+            .iter()
+            .enumerate()
+            .map(|(k, e)| growing(k) * (1.0 + 0.1 * e))
+            .collect();
+        assert_eq!(Transform::suggested(&values), Some(Transform::Log));
+    }
 }

@@ -62,6 +62,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 }
                 Shown::Report(in_order) => in_order,
             };
+            state.latest = Some((self.now, reading.slot.digest()));
             state.unreadable += u64::from(reading.is_unreadable());
             let (ratio, alive) = state.presence.report_arrived();
             together += ratio;

@@ -25,7 +25,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             self.dropped += slots.len() as u64;
             return Ok(false);
         };
-        let (readings, copied) = self.read(slots)?;
+        let (readings, copied) = self.read(slots, time)?;
         let is_copy = |reading: &Reading<'_, D>| {
             let same_time = self.history[from..].iter().filter(|checkpoint| checkpoint.time == time);
             let mut stored = same_time.flat_map(|checkpoint| &checkpoint.slots);

@@ -334,7 +334,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// Predicts the belief to `time` (seconds since the prior).
     ///
     /// # Errors
-    /// If the time is not finite or earlier than the present time.
+    /// If the time is not finite, earlier than the present time, or so late that the variance of the belief overflows.
     pub fn advance(&mut self, rng: &mut dyn Rng, time: f64) -> Result<&mut Self, Error> {
         let seconds = finite("time", time)? - self.now;
         if seconds < 0.0 {
@@ -347,7 +347,12 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 Some(alternative) => alternative.moved(&*self.world.over(seconds)?, self.noise_scale),
                 None => None,
             };
-            self.moved(rng, &mut belief, seconds)?;
+            self.moved(rng, &mut belief, seconds).map_err(|error| match error {
+                Error::NotANumber { .. } => {
+                    ArgumentError::new("time", time, "a time at which the belief has finite moments").into()
+                }
+                other => other,
+            })?;
             (self.belief, self.alternative) = (belief, alternative);
             let sensors = self.members.iter_mut().map(|member| &mut member.state.presence);
             self.outage.advance(seconds, &self.failures, sensors);

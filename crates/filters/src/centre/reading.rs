@@ -82,8 +82,8 @@ impl Tested {
 }
 
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
-    /// The slots in the order of the sensors' numbers, without copies of reports; and the seats whose reports were copied.
-    pub(super) fn read<'a>(&self, slots: &'a [Slot]) -> Result<(BySlot<Reading<'a, D>>, Vec<usize>), Error> {
+    /// The slots of this time in the order of the sensors' numbers, without copies of reports; and the seats whose reports were copied.
+    pub(super) fn read<'a>(&self, slots: &'a [Slot], time: f64) -> Result<(BySlot<Reading<'a, D>>, Vec<usize>), Error> {
         let mut seated: BySlot<(usize, &'a Slot)> = BySlot::new();
         let mut next_seat = 0;
         for slot in slots {
@@ -100,10 +100,24 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             }
             is_copy
         });
+        seated.retain(|(seat, slot)| {
+            let is_copy = self.is_copy(*seat, slot, time);
+            if is_copy {
+                copied.push(*seat);
+            }
+            !is_copy
+        });
         let readings = seated
             .into_iter()
             .map(|(seat, slot)| self.members[seat].reading(seat, slot));
         Ok((readings.collect::<Result<_, _>>()?, copied))
+    }
+
+    /// Whether this is the last report of the sensor once more: of the same instant.
+    pub(super) fn is_copy(&self, seat: usize, slot: &Slot, time: f64) -> bool {
+        let latest = self.members[seat].state.latest;
+        latest.is_some_and(|(at, digest)| at == time && digest == slot.digest())
+            && slot.observation.received().is_some()
     }
 
     /// Each of these reports tested by the Gaussian `given` and all the others, into `found`.

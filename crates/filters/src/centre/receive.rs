@@ -14,7 +14,8 @@ use fewbits_core::{Gaussian, Likelihood};
 use rand::Rng;
 
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
-    /// Updates with the observations of the present instant. Their order does not matter. An equal second report of a sensor is dropped.
+    /// Updates with the observations of the present instant. Their order does not matter. An equal second report of a sensor is dropped, also if it
+    /// comes in a call of its own.
     /// A report that is impossible, or too unlikely given the prediction and all other reports ([`Health`]), is not used, and costs no other
     /// report; an [event](Event) names it.
     ///
@@ -28,7 +29,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             return received;
         }
         let mut predicted = self.estimate();
-        let (readings, copied) = self.read(slots)?;
+        let (readings, copied) = self.read(slots, self.now)?;
         let mut events: Vec<Event> = copied
             .iter()
             .map(|seat| Event::Copied(self.members[*seat].number))
@@ -125,6 +126,9 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             return None;
         }
         let seat = self.seat(slot.sensor, 0).ok()?;
+        if self.is_copy(seat, slot, self.now) {
+            return None;
+        }
         let Member {
             sensor, group, state, ..
         } = &self.members[seat];

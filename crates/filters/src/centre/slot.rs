@@ -23,6 +23,14 @@ impl Slot {
             observation,
         }
     }
+
+    /// A number that tells two slots of a sensor apart (FNV-1a of 64 bits).
+    pub(super) fn digest(&self) -> u64 {
+        let report = self.observation.received();
+        let both = [Some(&self.feedback), report].into_iter().flatten();
+        let bytes = both.flat_map(|bits| bits.bytes().iter().copied().chain((bits.bits() as u64).to_le_bytes()));
+        bytes.fold(0xcbf2_9ce4_8422_2325, |digest, byte| (digest ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    }
 }
 
 /// Results of an update other than the belief.

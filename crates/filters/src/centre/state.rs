@@ -45,6 +45,9 @@ pub(super) struct MemberState {
     pub unreadable: u64,
     /// Number of copies of reports that were dropped.
     pub copies: u64,
+    /// Instant and digest of its last report.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub latest: Option<(f64, u64)>,
     pub repeats: Repeats,
     #[serde(default, skip_serializing_if = "Rate::is_empty")]
     pub rate: Rate,
@@ -69,6 +72,7 @@ impl MemberState {
             astray: 0,
             unreadable: 0,
             copies: 0,
+            latest: None,
             repeats: Repeats::new(),
             rate: Rate::default(),
         }

@@ -81,8 +81,8 @@ pub struct Fit {
     pub tests: Vec<SensorTest>,
     /// Correlations between the noises of two sensors, less what both share with the one to which they are relative.
     pub correlations: Vec<Correlation>,
-    /// Seconds in which the level returns to a mean, if that was not looked for and makes the readings likelier by 9.5 nats: a walk does so once
-    /// in hundreds of tables.
+    /// Seconds in which the level returns to a mean, if that was not looked for and makes the readings likelier by 11 nats than a return in ten
+    /// times the table's length: walks are seldom.
     pub returns: Option<f64>,
 }
 

@@ -11,8 +11,10 @@ use nalgebra::{DMatrix, DVector};
 /// A walk cannot be negative, so half of that is as much evidence.
 const WORTH: f64 = 2.0;
 const WORTH_OF_WALK: f64 = 1.35;
-/// The same of a level that returns, if nobody asked: a walk does so by chance, since it stays within the readings.
-const CERTAIN: f64 = 9.5;
+/// The same of a level that returns, if nobody asked, beside one that returns in so many times the table's length: a walk stays within the readings
+/// by chance.
+const CERTAIN: f64 = 11.0;
+const LONG: f64 = 10.0;
 /// The same of a drift beside a walk, or in place of one: a drift of several deviations of the noise that is there loses more than ten by being taken for
 /// a walk.
 const WORTH_BESIDE_WALK: f64 = 6.0;
@@ -277,11 +279,20 @@ impl<'a> Problem<'a> {
 
     /// The time in which the level returns to its mean, if that is certain. What was found before is lost.
     pub(super) fn returns(&mut self) -> Option<f64> {
-        let wandering = self.worth(&self.model);
+        let before = self.model.clone();
         let (found, is_short) = self.let_return();
-        self.model
-            .time_constant
-            .filter(|_| is_short && found > wandering + CERTAIN)
+        let seconds = self.model.time_constant.filter(|_| is_short)?;
+        // Beside a walk it would gain by what is supposed of the first level.
+        let time_constant = Some(LONG * self.length);
+        self.free.retain(|one| *one != Quantity::TimeConstant);
+        let mean = self.model.mean;
+        let long = [self.model.clone(), before].map(|model| LevelModel {
+            time_constant,
+            mean,
+            ..model
+        });
+        self.take_best(long.into_iter());
+        (found > self.climb_nearly() + CERTAIN).then_some(seconds)
     }
 
     /// Whether the level returns to its mean.

@@ -2,7 +2,7 @@
 
 use super::{Grid, NODES, REACH, Workspace, factor_of, regression};
 use crate::Error;
-use crate::contract::{Info, StateFilter};
+use crate::contract::{Info, StateFilter, predicted};
 use fewbits_core::{Columns, Gaussian, GaussianDynamics, Likelihood, OnAxes};
 use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::linalg::congruence;
@@ -133,7 +133,7 @@ impl<const D: usize, const K: usize> StateFilter<D> for GridFilter<D, K> {
         dynamics: &dyn GaussianDynamics<D>,
         belief: &mut Gaussian<D>,
     ) -> Result<(), Error> {
-        *belief = dynamics.predict(belief, 1.0);
+        *belief = predicted(dynamics, belief)?;
         Ok(())
     }
 

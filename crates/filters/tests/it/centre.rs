@@ -591,6 +591,35 @@ fn a_copy_of_a_report_is_dropped_and_counted() {
     assert_eq!((thrice.sensor(0).unwrap().copies, thrice.sensor(1).unwrap().copies), (18, 9));
 }
 
+/// Defect: a doubled datagram that came in a call of its own counted twice.
+#[test]
+fn a_copy_in_a_call_of_its_own_is_dropped() {
+    for (health, window) in [(Health::Exclude, 0.0), (Health::Off, 0.0), (Health::Report, 5.0)] {
+        let mut rng = Stream::new(8).rng();
+        let new = |rng: &mut dyn Rng| {
+            let centre = centre(MomentFilter, 2, 0.1, rng).with_health(health);
+            centre.with_window(window).unwrap()
+        };
+        let (mut once, mut doubled) = (new(&mut rng), new(&mut rng));
+        for k in 1..10 {
+            once.advance(&mut rng, f64::from(k)).unwrap();
+            doubled.advance(&mut rng, f64::from(k)).unwrap();
+            for report in [slot(0, noise(&mut rng)), slot(1, 0.25), slot(1, noise(&mut rng))] {
+                let one = [report.clone()];
+                once.receive(&mut rng, &one).unwrap();
+                doubled.receive(&mut rng, &one).unwrap();
+                // The state that is stored between the two knows the report.
+                let bytes = doubled.state().to_bytes().unwrap();
+                doubled.restore(CentreState::from_bytes(&bytes).unwrap()).unwrap();
+                let events = doubled.receive(&mut rng, &one).unwrap().events;
+                assert_eq!(events, [Event::Copied(report.sensor)]);
+            }
+        }
+        assert!(once.estimate() == doubled.estimate(), "{health:?}");
+        assert_eq!((doubled.sensor(0).unwrap().copies, doubled.sensor(1).unwrap().copies), (9, 18));
+    }
+}
+
 #[test]
 fn a_late_report_is_gated_and_never_ends_the_centre() {
     let mut rng = Stream::new(8).rng();

@@ -84,6 +84,31 @@ fn silence_leaves_the_exact_belief() {
     assert!((square / own - 1.0).abs() < 0.02, "{square} {own}");
 }
 
+/// Defect: the posterior of a value far out was a spike at the end of the grid.
+#[test]
+fn a_value_far_out_has_the_posterior_of_the_kalman_filter() {
+    for unit in [1e-9, 1.0, 1e9] {
+        let world = ContinuousLinear::random_walk(0.04 * unit * unit).unwrap();
+        for (noise, far) in [(1.0, -8.0), (0.1, 6.5), (0.1, 20.0), (0.3, -36.0), (3.0, 1e3)] {
+            let mut rng = Pcg64Mcg::seed_from_u64(1);
+            let prior = Gaussian::scalar(5.0 * unit, unit * unit).unwrap();
+            let (mut grid, mut exact) = (PointMassFilter::following(), MomentFilter);
+            let (mut one, mut other) = (grid.start(&mut rng, &prior).unwrap(), prior);
+            let (value, variance) = (5.0 + far, (noise * unit).powi(2));
+            let seen =
+                Observed::new(LinearSensor::direct(variance).unwrap(), Value::scalar(value * unit, variance).unwrap());
+            let logs = [
+                step(&mut grid, &mut rng, &world, &mut one, (1.0, &seen)),
+                step(&mut exact, &mut rng, &world, &mut other, (1.0, &seen)),
+            ];
+            let deviation = other.covariance()[0].sqrt();
+            assert!((one.mean() - other.mean()[0]).abs() < 0.05 * deviation, "{unit} {noise} {far}");
+            assert!((one.variance().sqrt() / deviation - 1.0).abs() < 0.05, "{unit} {noise} {far}");
+            assert!((logs[0] - logs[1]).abs() < 1e-3 * logs[1].abs(), "{unit} {noise} {far}: {logs:?}");
+        }
+    }
+}
+
 #[test]
 fn what_cannot_be_leaves_the_belief_as_it_was() {
     let mut rng = Pcg64Mcg::seed_from_u64(3);

@@ -4,10 +4,10 @@
 use fewbits_core::{BitString, FullValue, Gaussian, Link, Message, NumberFormat, Observation, OnAxes};
 use fewbits_filters::centre::{CentreState, Event, Failures, FusionCentre, Health, NoiseLearning, Reporting, Slot};
 use fewbits_filters::{
-    BootstrapFilter, GridFilter, Imm, MomentFilter, PointMassFilter, RaoBlackwellised, ResamplingRule, StateFilter,
-    UniformGrid,
+    BootstrapFilter, GridFilter, Imm, MomentFilter, Particles, PointMassFilter, RaoBlackwellised, ResamplingRule,
+    SigmaPointFilter, StateFilter, UniformGrid, smoother,
 };
-use fewbits_models::{ContinuousLinear, LinearSensor};
+use fewbits_models::{Ar1, ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
 use proptest::prelude::*;
 use rand::{Rng, RngExt};
@@ -230,4 +230,36 @@ fn one_report_is_taken_as_one_of_many() {
             }
         }
     }
+}
+
+/// Defect: finite arguments near the largest number gave infinite moments.
+#[test]
+fn moments_that_overflow_are_refused() {
+    let wide = || ContinuousLinear::random_walk(1.7e308).unwrap();
+    let mut rng = Stream::new(3).rng();
+    let prior = Gaussian::scalar(0.0, 1.0).unwrap();
+    let mut centre = FusionCentre::new(&mut rng, wide(), MomentFilter, &prior).unwrap();
+    centre.advance(&mut rng, 1.0).unwrap();
+    let before = centre.state();
+    let error = centre.advance(&mut rng, 2.0).map(drop).unwrap_err().to_string();
+    assert!(error.contains("time") && error.contains('2') && error.contains("finite"), "{error}");
+    assert!(centre.state() == before);
+    let over = wide().over(1.0).unwrap();
+    let far = Gaussian::scalar(0.0, 1.7e308).unwrap();
+    assert!(MomentFilter.predict(&mut rng, &over, &mut far.clone()).is_err());
+    assert!(
+        GridFilter::new([0])
+            .unwrap()
+            .predict(&mut rng, &over, &mut far.clone())
+            .is_err()
+    );
+    let mut points = SigmaPointFilter::<1>::cubature().unwrap();
+    let mut belief = points.start(&mut rng, &far).unwrap();
+    assert!(points.predict(&mut rng, &over, &mut belief).is_err());
+    let still = Ar1::new(1.0, 1.0).unwrap();
+    assert!(smoother::smooth_step(&still, &Gaussian::scalar(1.7e308, 1.0).unwrap(), &far).is_ok());
+    let opposite = [1.7e308, -1.7e308].map(|mean| Gaussian::scalar(mean, 1.0).unwrap());
+    assert!(smoother::smooth_step(&still, &opposite[0], &opposite[1]).is_err());
+    // The variance of particles would be infinite.
+    assert!(Particles::uniform([vec![1e154, 0.0]]).is_err());
 }

@@ -235,13 +235,14 @@ impl Solution {
             "certificate          {:?} over {:?}; words and cells were searched",
             self.certificate, self.scope
         );
-        for sensor in &self.sensors {
+        for (place, sensor) in self.sensors.iter().enumerate() {
+            let deviation = self.system.model().sample_deviation(place);
             let _ = writeln!(text, "sensor {}: {} bits, {} cells", sensor.sensor, sensor.bits, sensor.words.len());
             let _ = writeln!(text, "  {:>16} {:>16}  word", "from", "to");
             for (cell, word) in sensor.words.iter().enumerate() {
                 let edge = |i: Option<usize>, open: &str| {
                     i.and_then(|i| sensor.breakpoints.get(i))
-                        .map_or(open.to_owned(), |b| shown(*b))
+                        .map_or(open.to_owned(), |b| edge_shown(*b, deviation))
                 };
                 let (from, to) = (edge(cell.checked_sub(1), "-inf"), edge(Some(cell), "inf"));
                 let _ = writeln!(text, "  {from:>16} {to:>16}  {word:0width$b}", width = sensor.bits as usize);
@@ -253,6 +254,20 @@ impl Solution {
 
 /// Error of a value, in prior variances or nats.
 const VALUE_ERROR: f64 = 1e-12;
+
+/// Relative to the deviation of the samples.
+const SHOWN_EDGE: f64 = 1e-5;
+
+/// A breakpoint, with all digits if fewer would hide how samples of this deviation differ.
+fn edge_shown(number: f64, deviation: f64) -> String {
+    let short = shown(number);
+    let is_close = |read: f64| (read - number).abs() <= SHOWN_EDGE * deviation;
+    if short.parse().is_ok_and(is_close) {
+        short
+    } else {
+        format!("{number}")
+    }
+}
 
 /// Nine decimals, or as many digits and an exponent where decimals would hide the number.
 fn shown(number: f64) -> String {

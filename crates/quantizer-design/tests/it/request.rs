@@ -237,6 +237,23 @@ fn shared_out_bits_are_the_best_of_all_shares() {
     );
 }
 
+/// Defect: thresholds a thousandth apart at a thousand million were all printed as 1.00000000e9.
+#[test]
+fn a_table_tells_thresholds_apart() {
+    for mean in [20.0, -1e9] {
+        let noise = Noise::independent_with_deviations(&[1e-4]).unwrap();
+        let model = ObservationModel::new(Prior::normal(mean, 1e-3).unwrap(), noise).unwrap();
+        let found = best(model, BitBudget::Each(2), Link::PERFECT);
+        let table = found.table();
+        let edges = table
+            .lines()
+            .filter_map(|line| line.split_whitespace().nth(1)?.parse::<f64>().ok());
+        let edges: Vec<f64> = edges.filter(|edge| (edge - mean).abs() < 0.1).collect();
+        let exact = &found.sensors()[0].breakpoints;
+        assert!(edges.len() >= 3 && exact.iter().all(|b| edges.iter().any(|e| (e - b).abs() < 1e-7)), "{table}");
+    }
+}
+
 /// For each model the evaluations of Nelder-Mead that take as much time on the processor as the design (measured once). Both are sums over the
 /// same nodes.
 const EQUAL_TIME: [usize; 5] = [360, 110, 290, 66, 32];

@@ -191,6 +191,7 @@ fn finish(density: &impl Density, b: &[f64], cells: &[CellMoments]) -> Result<Ll
     let breakpoints: Vec<f64> = b.iter().map(|b| centre + b).collect();
     check_increasing(&breakpoints)?;
     all_finite("centroids", &centroids)?;
+    all_finite("squared error", &[error])?;
     Ok(LloydMax {
         breakpoints,
         centroids,

@@ -92,7 +92,7 @@ impl LloydMax {
     ///
     /// # Errors
     /// If `mean` is not finite, `deviation` is not a positive number, the mean is so large that breakpoints coincide,
-    /// or a centroid overflows.
+    /// or a centroid or the squared error overflows.
     pub fn affine(&self, mean: f64, deviation: f64) -> Result<Self, Error> {
         finite("mean", mean)?;
         positive("deviation", deviation)?;
@@ -101,11 +101,15 @@ impl LloydMax {
         check_increasing(&breakpoints)?;
         let centroids = map(&self.centroids);
         all_finite("centroids", &centroids)?;
+        let mean_squared_error = deviation * (deviation * self.mean_squared_error);
+        if !mean_squared_error.is_finite() {
+            return refuse("deviation", deviation, "a deviation whose square is finite");
+        }
         Ok(Self {
             breakpoints,
             centroids,
             probabilities: self.probabilities.clone(),
-            mean_squared_error: deviation * (deviation * self.mean_squared_error),
+            mean_squared_error,
         })
     }
 }
@@ -136,5 +140,15 @@ mod tests {
         ] {
             assert!(serde_json::from_str::<LloydMax>(&json.replacen(from, to, 1)).is_err());
         }
+    }
+
+    #[test]
+    fn errors_that_overflow_are_refused() {
+        let error = gaussian(4).unwrap().affine(0.0, 1e160).unwrap_err();
+        assert!(error.to_string().contains("deviation"), "{error}");
+        let wide = crate::density::Uniform::new(-1e200, 1e200).unwrap();
+        assert!(crate::lloyd_max::design(&wide, 4).is_err());
+        assert!(gaussian(4).unwrap().affine(1e200, 1e150).is_err());
+        assert!(gaussian(4).unwrap().affine(1e150, 1e150).is_ok());
     }
 }
