@@ -240,8 +240,18 @@ pub(crate) fn predicted(
     moved.with_noise(noise[0], resolution).belief()
 }
 
-/// The posterior on a grid that resolves it, and the log-likelihood of the observations. What is too far from the belief for its grid conditions a
-/// Gaussian of its moments.
+/// Whether the fourth moment is about that of a normal belief; the last silence of a sensor leaves less.
+fn is_nearly_normal(belief: &PointMass) -> bool {
+    let (mean, variance, grid) = (belief.mean(), belief.variance(), belief.grid());
+    let density = belief.density().iter().enumerate();
+    let fourth = density
+        .map(|(i, p)| p * grid.spacing() * (grid.node(i) - mean).powi(4))
+        .sum::<f64>();
+    (fourth / (variance * variance) - 3.0).abs() < 0.5
+}
+
+/// The posterior on a grid that resolves it, and the log-likelihood of the observations. What is too far from a nearly normal belief for its grid
+/// conditions a Gaussian of its moments.
 pub(crate) fn updated(
     belief: &PointMass,
     observed: &[&dyn Likelihood<1>],
@@ -265,7 +275,7 @@ pub(crate) fn updated(
         let (density, h) = (posterior.density(), posterior.grid().spacing());
         let squares: f64 = density.iter().map(|p| (p * h).powi(2)).sum();
         let peak = density.iter().copied().fold(0.0, f64::max);
-        if pass == 0 && density[0].max(density[density.len() - 1]) > end * peak {
+        if pass == 0 && density[0].max(density[density.len() - 1]) > end * peak && is_nearly_normal(belief) {
             let mut moments = Gaussian::new(Belief::mean(belief), belief.covariance())?;
             let evidence = observed.condition(&mut moments)?;
             return Ok((start(&moments, resolution)?, evidence.log_likelihood));

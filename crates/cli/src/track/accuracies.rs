@@ -1,12 +1,7 @@
 //! Accuracies that rows of `ranges` state, as shares of the noise that is estimated.
 
-use super::rows::Instants;
-use crate::error::Error;
-use crate::files::is_regular;
 use crate::numbers::short;
 
-/// Rows from which the accuracy is taken that stands for the estimated noise.
-const FIRST_ROWS: usize = 600;
 /// The noise that is found may differ from what rows state by this factor before it is said.
 const APART: f64 = 2.0;
 
@@ -17,17 +12,13 @@ pub(super) struct Accuracies {
 }
 
 impl Accuracies {
-    /// The median of the first rows of a file. What comes through a pipe is not waited for: the first accuracy is taken.
-    pub(super) fn of(instants: &mut Instants, file: &str) -> Result<Self, Error> {
-        let mut found: Vec<f64> = Vec::new();
-        if instants.roles.any_accuracy().is_some() && is_regular(file) {
-            let stated = instants.peek(FIRST_ROWS)?.iter().flat_map(|row| &row.qualifiers);
-            found.extend(stated.filter_map(|one| one.accuracy).filter(|accuracy| *accuracy > 0.0));
-            found.sort_by(f64::total_cmp);
+    /// The median of what the first rows of a file state. What comes through a pipe is not waited for: the first accuracy is taken.
+    pub(super) fn of(mut stated: Vec<f64>) -> Self {
+        stated.retain(|accuracy| *accuracy > 0.0);
+        stated.sort_by(f64::total_cmp);
+        Self {
+            reference: stated.get(stated.len() / 2).copied(),
         }
-        Ok(Self {
-            reference: found.get(found.len() / 2).copied(),
-        })
     }
 
     /// The noise of a range, as a share of the estimated one. A range that states none has that.

@@ -80,6 +80,7 @@ mod sensors;
 mod settings;
 mod stuck;
 mod summary;
+mod target;
 mod targets;
 mod told;
 mod transform;
@@ -96,7 +97,7 @@ use crate::table_options::TableOptions;
 use columns::{Finds, Kind};
 use fewbits_table::names::as_argument;
 use rows::Instants;
-use targets::Target;
+use target::Target;
 
 /// Runs the task.
 pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {

@@ -12,7 +12,7 @@ use super::range_summary::{AnchorSummary, OFTEN, Summary, lines};
 use super::report::{first_cell, first_name, summarise};
 use super::rows::Instants;
 use super::sensors;
-use super::targets::Target;
+use super::target::Target;
 use super::told::take_told;
 use crate::arguments::RangesOptions;
 use crate::error::Error;
@@ -31,6 +31,17 @@ const SHORT: f64 = 0.05;
 const FAR: f64 = 3.0;
 /// Probability below which an anchor whose ranges travel as levels is told to contradict the others.
 const SURELY: f64 = 0.1;
+/// Rows from which the accuracy is taken that stands for the estimated noise.
+const FIRST_ROWS: usize = 600;
+
+/// The accuracies that the first rows of a file state.
+fn stated(instants: &mut Instants, file: &str) -> Result<Vec<f64>, Error> {
+    if instants.roles.any_accuracy().is_none() || !is_regular(file) {
+        return Ok(Vec::new());
+    }
+    let stated = instants.peek(FIRST_ROWS)?.iter().flat_map(|row| &row.qualifiers);
+    Ok(stated.filter_map(|one| one.accuracy).collect())
+}
 
 /// Names of the columns behind the first.
 fn columns(axes: usize) -> Vec<String> {
@@ -91,7 +102,7 @@ pub(super) fn run(
         return Err(unknown(instants.file(), name, file));
     }
     let axes = tracker.coordinates();
-    let mut accuracies = Accuracies::of(&mut instants, &options.table.file)?;
+    let mut accuracies = Accuracies::of(stated(&mut instants, &options.table.file)?);
     let names = std::iter::once(first_name(&instants).to_owned())
         .chain(target.map(|_| "target".to_owned()))
         .chain(columns(axes))

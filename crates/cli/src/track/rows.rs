@@ -8,7 +8,7 @@ use super::late::Late;
 use super::own_columns::OwnColumns;
 use super::samples::Samples;
 use super::seconds::Seconds;
-use super::targets::OfTarget;
+use super::target::OfTarget;
 use super::transform::Transform;
 use crate::arguments::TableOptions;
 use crate::clock;

@@ -2,6 +2,7 @@
 
 use super::anchors::Anchor;
 use super::columns::{is_place, words};
+use super::target::{OfTarget, Target};
 use crate::arguments::TableOptions;
 use crate::error::Error;
 use crate::files::is_regular;
@@ -24,29 +25,6 @@ const FEWEST: usize = 8;
 const MOST: usize = 20;
 /// Targets that are tracked, at most.
 const MOST_TRACKED: usize = 1000;
-
-/// A target of a table.
-pub(super) struct Target {
-    pub(super) name: String,
-    pub(super) rows: OfTarget,
-    /// The names of all.
-    pub(super) all: Rc<[String]>,
-}
-
-/// The number of a target, and that of each row.
-#[derive(Clone)]
-pub(super) struct OfTarget {
-    number: usize,
-    rows: Rc<[Option<usize>]>,
-}
-
-impl OfTarget {
-    /// Whether a row, counted from 1, is of this target.
-    pub(super) fn has(&self, row: u64) -> bool {
-        let place = usize::try_from(row).unwrap_or(usize::MAX).wrapping_sub(1);
-        self.rows.get(place).copied().flatten() == Some(self.number)
-    }
-}
 
 /// The targets that a column of a file names, as they come, with their rows.
 pub(super) fn targets(options: &TableOptions, column: &str) -> Result<Vec<Target>, Error> {
@@ -77,10 +55,7 @@ pub(super) fn targets(options: &TableOptions, column: &str) -> Result<Vec<Target
     let all: Rc<[String]> = names.into();
     let of = |(number, name): (usize, &String)| Target {
         name: name.clone(),
-        rows: OfTarget {
-            number,
-            rows: Rc::clone(&rows),
-        },
+        rows: OfTarget::new(number, Rc::clone(&rows)),
         all: Rc::clone(&all),
     };
     Ok(all.iter().enumerate().map(of).collect())

@@ -35,7 +35,7 @@ impl TryFrom<Stored> for UniformGrid {
 const MAX_NODES: usize = 1_000_000;
 
 /// Largest extent of a grid: squares of distances are still finite.
-pub(crate) const MAX_WIDTH: f64 = 1e153;
+pub(super) const MAX_WIDTH: f64 = 1e153;
 
 impl UniformGrid {
     /// So many nodes from `lower` on, at this distance.

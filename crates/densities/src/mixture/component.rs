@@ -1,9 +1,8 @@
 //! One Gaussian of a mixture.
 
 use crate::Error;
-use crate::particles::have_squares;
 use fewbits_core::{Columns, Gaussian};
-use fewbits_numerics::error::non_negative;
+use fewbits_numerics::error::{all_finite, non_negative};
 use fewbits_numerics::factored::Factored;
 use fewbits_numerics::kernels::vectorised;
 use fewbits_numerics::linalg::symmetrised;
@@ -25,11 +24,11 @@ impl<const D: usize> Component<D> {
     /// A component of any weight from 0 up. A [`Mixture`](crate::Mixture) normalises the weights of its components.
     ///
     /// # Errors
-    /// If the weight is negative or not finite, the mean is not finite or beyond 1e153, or the covariance is not symmetric positive definite
+    /// If the weight is negative or not finite, the mean is not finite, or the covariance is not symmetric positive definite
     /// (judged with its diagonal scaled to one, so rows may have very different units).
     pub fn new(weight: f64, mean: SVector<f64, D>, covariance: SMatrix<f64, D, D>) -> Result<Self, Error> {
         non_negative("weight", weight)?;
-        have_squares("mean", mean.as_slice())?;
+        all_finite("mean", mean.as_slice())?;
         let factor = Factored::new("covariance", &covariance)?;
         Ok(Self {
             weight,

@@ -10,7 +10,6 @@ pub use systematic::{systematic, systematic_into};
 pub use weights::Categorical;
 
 use crate::Error;
-use crate::grids::MAX_WIDTH;
 use fewbits_core::columns::state_at;
 use fewbits_core::{Belief, Columns, ColumnsMut};
 use fewbits_numerics::ArgumentError;
@@ -51,17 +50,6 @@ pub struct Particles<const D: usize> {
     scratch: Vec<f64>,
 }
 
-/// Accepts numbers of which variances can be computed.
-pub(crate) fn have_squares(name: &'static str, values: &[f64]) -> Result<(), ArgumentError> {
-    match values.iter().position(|v| v.is_nan() || v.abs() > MAX_WIDTH) {
-        None => Ok(()),
-        Some(at) => {
-            let expected = format!("numbers of at most {MAX_WIDTH:e}, whose squares are finite");
-            Err(ArgumentError::new(name, format!("{} at index {at}", values[at]), expected))
-        }
-    }
-}
-
 impl<const D: usize> Particles<D> {
     /// Particles from their columns and log weights. The log weights may have any common offset; `-inf` is a weight of zero.
     ///
@@ -83,13 +71,13 @@ impl<const D: usize> Particles<D> {
     /// Equally weighted particles from their columns.
     ///
     /// # Errors
-    /// If lengths differ, there is no particle, or a coordinate is not finite or beyond 1e153, where its square overflows.
+    /// If lengths differ, there is no particle, or a coordinate is not finite.
     pub fn uniform(columns: [Vec<f64>; D]) -> Result<Self, Error> {
         let count = columns.first().map_or(0, Vec::len);
         at_least_one("particles", count)?;
         for column in &columns {
             entries("columns", column.len(), count)?;
-            have_squares("columns", column)?;
+            all_finite("columns", column)?;
         }
         let mut belief = Self {
             columns,

@@ -32,6 +32,7 @@ mod mirror;
 mod mistakes;
 mod moved;
 mod odds;
+mod push;
 mod residuals;
 mod rest;
 mod root;
