@@ -10,13 +10,12 @@ const WIDER: f64 = 1.25;
 /// Smallest and largest of some values; `None` without values.
 pub(crate) type Ends = Option<(f64, f64)>;
 
-/// The ends including one more cell, if it is finite.
-pub(crate) fn with(ends: Ends, cell: Option<f64>) -> Ends {
-    match (ends, cell.filter(|value| value.is_finite())) {
-        (None, value) => value.map(|value| (value, value)),
-        (ends, None) => ends,
-        (Some(ends), Some(value)) => Some(wider(ends, value)),
-    }
+/// The ends including more cells, of those that are finite.
+pub(crate) fn with(ends: Ends, cells: &[Option<f64>]) -> Ends {
+    let finite = cells.iter().flatten().filter(|value| value.is_finite());
+    let none = (f64::INFINITY, f64::NEG_INFINITY);
+    let (low, high) = finite.fold(ends.unwrap_or(none), |ends, value| wider(ends, *value));
+    (low <= high).then_some((low, high))
 }
 
 /// The ends including one more number. Comparisons, since `f64::min` is a call in WebAssembly.
@@ -35,7 +34,7 @@ impl Ranges {
 
     /// Includes cells of a column.
     pub(crate) fn add(&mut self, column: usize, cells: &[Option<f64>]) {
-        self.0[column] = cells.iter().fold(self.0[column], |ends, cell| with(ends, *cell));
+        self.0[column] = with(self.0[column], cells);
     }
 
     /// A bound that does not exceed the column's share of the present range; 0 if the range is empty or overflows. `None` for columns

@@ -125,8 +125,7 @@ impl<R: Read + Seek> Playback<R> {
             let all: Result<(), Error> = self.blocks().try_for_each(|block| {
                 let block = block?;
                 for (i, found) in found.iter_mut().enumerate() {
-                    let cells = block.columns[i].iter();
-                    found.ends = cells.fold(found.ends, |ends, cell| ranges::with(ends, *cell));
+                    found.ends = ranges::with(found.ends, &block.columns[i]);
                     found.share_bound = found.share_bound.max(block.share_bounds[i].unwrap_or(0.0));
                 }
                 Ok(())

@@ -62,6 +62,9 @@ fn plain(header: &Header, apart: bool, column: usize) -> u8 {
 
 /// The cells of another column in the rows in which a column has values; NaN for gaps.
 pub(crate) fn aligned(cells: &[Option<f64>], has_value: &[bool]) -> Vec<f64> {
+    if has_value.iter().all(|has| *has) {
+        return cells.iter().map(|cell| cell.unwrap_or(f64::NAN)).collect();
+    }
     let mut values = Vec::with_capacity(cells.len());
     let kept = cells.iter().zip(has_value).filter(|(_, kept)| **kept);
     values.extend(kept.map(|(cell, _)| cell.unwrap_or(f64::NAN)));
