@@ -37,7 +37,8 @@ impl Waiting {
         let (found, columns) = (lengths.len(), self.columns.len());
         if found != columns {
             let expected = format!("{columns}, one per column");
-            return Err(ArgumentError::new(argument, format!("{found} cells"), expected));
+            let what = if argument == "row" { "cells" } else { "columns" };
+            return Err(ArgumentError::new(argument, format!("{found} {what}"), expected));
         }
         let mut lengths = lengths;
         match lengths.find(|length| *length != rows) {
