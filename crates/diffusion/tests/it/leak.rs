@@ -257,18 +257,22 @@ fn bad_readings_and_priors_are_refused() {
     assert!((total - 1.0).abs() < 1e-12 && belief.misfit() == 1.0);
 }
 
-/// One cell, one start: a value lies between two of the 24 rates, and many accurate values of a sensor share what the nearer rate is off by. The
-/// truth is an integral over that offset on a grid.
-#[test]
-fn many_accurate_values_do_not_name_one_rate_of_the_grid() {
+/// A room of one cell with a sensor.
+fn one_cell(ages: &[f64]) -> SensorField {
     let domain = Plan::parse("###\n#a#\n###\na = room")
         .unwrap()
         .domain(1.0, 1, 0.0)
         .unwrap();
     let still = Flow::still(&domain);
     let transport = Transport::new(domain, 0.02, &still, 1e-3, FluxRule::default()).unwrap();
-    let at = [[1.5, 1.5, 0.0]];
-    let field = SensorField::transient(&transport, &at, &[1000.0], StepControl::Tolerance(1e-3)).unwrap();
+    SensorField::transient(&transport, &[[1.5, 1.5, 0.0]], ages, StepControl::Tolerance(1e-3)).unwrap()
+}
+
+/// One cell, one start: a value lies between two of the 24 rates, and many accurate values of a sensor share what the nearer rate is off by. The
+/// truth is an integral over that offset on a grid.
+#[test]
+fn many_accurate_values_do_not_name_one_rate_of_the_grid() {
+    let field = one_cell(&[1000.0]);
     let (response, step) = (field.response(0, 0).unwrap()[0], f64::ln(100.0) / 24.0);
     let prior = LeakPrior {
         start: [0.0, 0.0],
@@ -319,13 +323,7 @@ fn many_accurate_values_do_not_name_one_rate_of_the_grid() {
 /// starts and 120 rates. Words of a sensor share where between two starts of the belief the leak began.
 #[test]
 fn words_tell_the_rate_as_a_finer_sum_does() {
-    let domain = Plan::parse("###\n#a#\n###\na = room")
-        .unwrap()
-        .domain(1.0, 1, 0.0)
-        .unwrap();
-    let still = Flow::still(&domain);
-    let transport = Transport::new(domain, 0.02, &still, 1e-3, FluxRule::default()).unwrap();
-    let field = SensorField::transient(&transport, &[[1.5, 1.5, 0.0]], &AGES, StepControl::Tolerance(1e-3)).unwrap();
+    let field = one_cell(&AGES);
     let prior = LeakPrior {
         start: [0.0, 7200.0],
         rate: [1e-7, 1e-5],
