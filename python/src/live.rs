@@ -85,15 +85,16 @@ fn over<const D: usize>(built: &mut Built<D>, instants: &Instants, smooth: Smoot
         if number % ROWS == ROWS - 1 {
             Python::attach(|py| py.check_signals())?;
         }
-        let from = built.time();
         let (scale, row): (f64, Row) = (built.noise_scale(), Built::step(built, &instant)?);
         rows.push(&built.belief(), row);
         if smooth != Smooth::No {
-            trail.push(built.mark(from, scale, rows.restarted()));
+            trail.push(built.filtered(scale, rows.restarted()));
         }
     }
-    if smooth != Smooth::No {
-        rows.smoothed = Some(built.smoothed(&trail, smooth)?);
-    }
+    rows.smoothed = match smooth {
+        Smooth::No => None,
+        Smooth::All => Some(built.smoothed(&trail, None)?),
+        Smooth::Within(lag) => Some(built.smoothed(&trail, Some(lag))?),
+    };
     Ok(rows)
 }

@@ -65,6 +65,12 @@ pub(crate) enum Moves<const D: usize> {
 /// Largest distance of a time from a whole number of steps, as a share of one.
 const WHOLE: f64 = 1e-6;
 
+impl<const D: usize> Evolution<D> for Moves<D> {
+    fn over(&self, seconds: f64) -> Result<Box<dyn GaussianDynamics<D> + '_>, ArgumentError> {
+        Ok(Box::new(self.lasting(seconds)?))
+    }
+}
+
 impl<const D: usize> Moves<D> {
     /// The model over `seconds`; of a model in steps only over whole ones.
     pub(crate) fn lasting(&self, seconds: f64) -> Result<AffineGaussian<D>, ArgumentError> {

@@ -10,9 +10,8 @@ use arrow_array::builder::StringBuilder;
 use arrow_array::{ArrayRef, Int64Array};
 use fewbits_core::{BitString, Gaussian, Observation, SensorNode};
 use fewbits_filters::centre::{CentreState, Event, Failures, FusionCentre, NoiseLearning, Slot};
-use fewbits_filters::smoother::smooth_step;
+use fewbits_filters::smoother::{Filtered, smooth};
 use fewbits_filters::{Error, MomentFilter};
-use fewbits_models::LinearGaussian;
 use fewbits_monte_carlo::Stream;
 use nalgebra::{SMatrix, SVector, Vector1};
 use rand_pcg::Pcg64Mcg;
@@ -45,16 +44,6 @@ pub(crate) enum Smooth {
     All,
     /// Those of so many seconds.
     Within(f64),
-}
-
-/// A filtered belief, and the prediction that led to it.
-pub(crate) struct Mark<const D: usize> {
-    belief: Gaussian<D>,
-    /// Seconds since the belief before.
-    seconds: f64,
-    noise_scale: f64,
-    /// Whether the belief does not follow from the one before.
-    restarted: bool,
 }
 
 impl<const D: usize> Built<D> {
@@ -210,71 +199,25 @@ impl<const D: usize> Built<D> {
         seat.map_or(event.name().to_owned(), |seat| format!("{} {}", seat.name, event.name()))
     }
 
-    /// What smoothing needs of the present belief.
-    pub(crate) fn mark(&self, from: f64, noise_scale: f64, restarted: bool) -> Mark<D> {
-        Mark {
+    /// The present belief as smoothing takes it.
+    pub(crate) fn filtered(&self, noise_scale: f64, is_new: bool) -> Filtered<D> {
+        Filtered {
+            seconds: self.time(),
             belief: self.belief(),
-            seconds: self.time() - from,
             noise_scale,
-            restarted,
+            is_new,
         }
     }
 
-    /// Mean and deviation of each coordinate given later rows too, by columns. A belief that was restarted says nothing of those before.
-    pub(crate) fn smoothed(&self, trail: &[Mark<D>], smooth: Smooth) -> Outcome<Vec<Vec<f64>>> {
-        let mut columns = vec![vec![0.0; trail.len()]; 2 * D];
-        let mut keep = |row: usize, belief: &Gaussian<D>| {
-            for i in 0..D {
-                columns[2 * i][row] = belief.mean()[i];
-                columns[2 * i + 1][row] = belief.covariance()[(i, i)].sqrt();
-            }
+    /// Mean and deviation of each coordinate given later rows too, by columns.
+    pub(crate) fn smoothed(&self, trail: &[Filtered<D>], lag: Option<f64>) -> Outcome<Vec<Vec<f64>>> {
+        let beliefs = smooth(&self.model, trail, lag)?;
+        let column = |i: usize| {
+            let of = |belief: &Gaussian<D>| (belief.mean()[i], belief.covariance()[(i, i)].sqrt());
+            let (means, deviations) = beliefs.iter().map(of).unzip();
+            [means, deviations]
         };
-        let Smooth::Within(lag) = smooth else {
-            let Some(last) = trail.last() else {
-                return Ok(columns);
-            };
-            let mut belief = last.belief;
-            keep(trail.len() - 1, &belief);
-            for row in (0..trail.len() - 1).rev() {
-                belief = self.backward(&trail[row], &belief, &trail[row + 1])?;
-                keep(row, &belief);
-            }
-            return Ok(columns);
-        };
-        // The last row within the lag, and its distance from the first of them.
-        let (mut last, mut ahead) = (0, 0.0);
-        for row in 0..trail.len() {
-            if row > 0 {
-                ahead -= trail[row].seconds;
-            }
-            if last < row {
-                (last, ahead) = (row, 0.0);
-            }
-            // Distances are differences of rounded times.
-            while last + 1 < trail.len() && ahead + trail[last + 1].seconds <= lag * (1.0 + 1e-12) {
-                last += 1;
-                ahead += trail[last].seconds;
-            }
-            let mut belief = trail[last].belief;
-            for earlier in (row..last).rev() {
-                belief = self.backward(&trail[earlier], &belief, &trail[earlier + 1])?;
-            }
-            keep(row, &belief);
-        }
-        Ok(columns)
-    }
-
-    /// The belief of a row given those after it: `later` is that of the next row, `step`, given what follows.
-    fn backward(&self, mark: &Mark<D>, later: &Gaussian<D>, step: &Mark<D>) -> Outcome<Gaussian<D>> {
-        if step.restarted {
-            return Ok(mark.belief);
-        }
-        let moved = self.model.lasting(step.seconds)?;
-        let dynamics =
-            LinearGaussian::with_covariance(*moved.transition(), moved.noise_covariance() * step.noise_scale)?;
-        // The step of the smoother has no offset: it is taken off the mean of the later belief.
-        let later = Gaussian::new(later.mean() - moved.offset(), *later.covariance())?;
-        Ok(smooth_step(&dynamics, &mark.belief, &later)?)
+        Ok((0..D).flat_map(column).collect())
     }
 }
 
