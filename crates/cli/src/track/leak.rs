@@ -3,7 +3,7 @@
 use super::columns::Kind;
 use super::leak_rooms::Rooms;
 use super::report::{BAND, first_cell, first_name, summarise};
-use super::rows::Instants;
+use super::rows;
 use crate::Ending;
 use crate::arguments::LeakOptions;
 use crate::error::Error;
@@ -116,9 +116,10 @@ pub(super) fn run(options: &LeakOptions) -> Result<Ending, Error> {
         by: options.table.by.clone(),
         ..Kind::default()
     };
-    let mut instants = Instants::open(&options.table, &kind)?;
+    let mut instants = rows::open(&options.table, &kind, None)?;
+    let failed = Error::tracking(instants.source().file());
     let mut rows = Vec::new();
-    while let Some(instant) = instants.next()? {
+    while let Some(instant) = instants.next().map_err(&failed)? {
         rows.push(instant);
     }
     let known: Vec<&str> = rooms.names().collect();
@@ -126,10 +127,13 @@ pub(super) fn run(options: &LeakOptions) -> Result<Ending, Error> {
         known.iter().position(|known| known == name).ok_or_else(|| {
             let names = known.join(", ");
             let mend = "add it there, choose columns with --columns, or name the column of sensors with --by";
-            Error::content(instants.file(), format_args!("`{name}` is no sensor of {file}, which has {names}: {mend}"))
+            Error::content(
+                instants.source().file(),
+                format_args!("`{name}` is no sensor of {file}, which has {names}: {mend}"),
+            )
         })
     };
-    let places: Vec<usize> = instants.names.iter().map(place).collect::<Result<_, _>>()?;
+    let places: Vec<usize> = instants.names().iter().map(place).collect::<Result<_, _>>()?;
     let (mut belief, transport) = rooms.belief(&plan, rows.last().map_or(0.0, |row| row.seconds))?;
     let names = std::iter::once(first_name(&instants).to_owned())
         .chain(columns(&plan))
@@ -145,7 +149,7 @@ pub(super) fn run(options: &LeakOptions) -> Result<Ending, Error> {
                 continue;
             };
             let failed = |source| Error::Row {
-                file: instants.file().to_owned(),
+                file: instants.source().file().to_owned(),
                 row: row.row,
                 source,
             };
@@ -181,7 +185,7 @@ pub(super) fn run(options: &LeakOptions) -> Result<Ending, Error> {
     let summary = Summary {
         rows: count as u64,
         readings: heard.iter().sum(),
-        copies: instants.copies,
+        copies: instants.copies(),
         silent: silent.map(|(name, _)| (*name).to_owned()).collect(),
         hints: (0..known.len()).filter(is_bits).map(hint).collect(),
         area: found.area,

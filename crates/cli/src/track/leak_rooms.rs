@@ -1,11 +1,11 @@
 //! The file of rooms of the task `leak`.
 
-use super::instant::Qualifier;
 use crate::error::Error;
 use fewbits_diffusion::{
     Flow, FluxRule, LeakBelief, LeakPrior, Plan, PotentialFlow, Reading, SensorField, StepControl, Transport,
 };
 use fewbits_table::Side;
+use fewbits_tracking::Qualifier;
 use serde::Deserialize;
 use std::path::Path;
 

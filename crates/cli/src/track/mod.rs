@@ -35,68 +35,36 @@
 
 mod accuracies;
 mod anchors;
-pub(crate) mod applied;
-mod centre;
+pub(crate) mod calibration;
 mod columns;
-mod constant;
-mod derived;
 mod divisor;
-mod doubts;
-mod estimator;
-mod first;
-mod fit;
-mod followed;
-mod found;
-mod groups;
-mod held;
-mod hints;
-mod instant;
-mod lags;
-mod lasting;
-mod late;
-mod later;
 mod leak;
 mod leak_rooms;
 mod level;
-mod limits;
-mod marks;
-mod meaning;
+mod level_options;
 mod mistakes;
 mod odometry;
-mod open;
 mod own_columns;
 mod path;
 mod picture;
 mod range_settings;
 mod range_summary;
 mod ranges;
-mod remote;
 mod report;
-mod rhythm;
 mod rows;
-mod samples;
 mod seconds;
-mod sensors;
-mod settings;
-mod stuck;
-mod summary;
 mod target;
 mod targets;
 mod told;
-mod transform;
-mod units;
-mod world;
-
-pub(crate) use transform::Transform;
 
 use crate::Ending;
-use crate::arguments::{FitOptions, LeakOptions, Model, RangesOptions, TrackOptions};
+use crate::arguments::{FitOptions, LeakOptions, RangesOptions};
 use crate::error::Error;
 use crate::output::Sheet;
 use crate::table_options::TableOptions;
+use crate::track_options::{Model, TrackOptions};
 use columns::{Finds, Kind};
 use fewbits_table::names::as_argument;
-use rows::Instants;
 use target::Target;
 
 /// Runs the task.
@@ -108,13 +76,13 @@ pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {
             reason: "--anchors says where ranges are measured from",
         }),
         _ => {
-            let instants = Instants::open(&options.table, &Kind::of(options)?)?;
+            let instants = rows::open(&options.table, &Kind::of(options)?, None)?;
             let mut options = options.clone();
-            options.table.by.clone_from(&instants.roles.by);
-            options.accuracy_column = instants.roles.any_accuracy().cloned();
-            let (options, corrections) = applied::applied(&options, &instants.names)?;
+            let roles = &instants.source().roles;
+            options.table.by.clone_from(&roles.by);
+            options.accuracy_column = roles.any_accuracy().cloned();
             check_transform(&options)?;
-            level::run(&options, instants.corrected(corrections, options.transform))
+            level::run(&options, instants)
         }
     }
 }
@@ -139,7 +107,7 @@ fn check_transform(options: &TrackOptions) -> Result<(), Error> {
 
 /// Runs the task `fit`.
 pub(crate) fn fit(options: &FitOptions) -> Result<Ending, Error> {
-    fit::run(options)
+    calibration::run(options)
 }
 
 /// Runs the task `leak`.
@@ -162,10 +130,9 @@ pub(crate) fn ranges(options: &RangesOptions) -> Result<Ending, Error> {
     }
     let anchors = anchors::read_anchors(&options.anchors)?;
     let run = |table: &TableOptions, of: Option<Target>, output: &mut Option<Sheet>| {
-        let mut instants = Instants::open(table, &kind)?;
+        let instants = rows::open(table, &kind, of.as_ref().map(|target| target.rows.clone()))?;
         let mut options = options.clone();
-        options.table.by.clone_from(&instants.roles.by);
-        instants.only = of.as_ref().map(|target| target.rows.clone());
+        options.table.by.clone_from(&instants.source().roles.by);
         ranges::run(&options, &anchors, instants, of.as_ref(), output)
     };
     let mut output = None;

@@ -1,10 +1,10 @@
 //! Odometry of `ranges`: columns of what the target moved since the row before.
 
 use super::anchors::Anchor;
-use super::instant::Instant;
 use super::rows::Instants;
 use crate::arguments::RangesOptions;
 use crate::error::Error;
+use fewbits_tracking::Instant;
 use nalgebra::Vector3;
 
 /// Names of the columns, one for each axis.
@@ -20,9 +20,9 @@ impl Odometry {
             if anchors.iter().any(|(anchor, _)| anchor == name) {
                 return Err(Error::option("--odometry", name, "no anchor's name"));
             }
-            if options.table.by.is_none() && !instants.names.contains(name) {
-                let problem = format!("no column `{name}` of --odometry: there are {}", instants.names.join(", "));
-                return Err(Error::content(instants.file(), problem));
+            if options.table.by.is_none() && !instants.names().contains(name) {
+                let problem = format!("no column `{name}` of --odometry: there are {}", instants.names().join(", "));
+                return Err(Error::content(instants.source().file(), problem));
             }
         }
         Ok(Self(names.clone()))

@@ -1,8 +1,9 @@
 //! What the options of `ranges` say of ranges and target.
 
-use crate::arguments::{RangesOptions, TrackOptions};
+use crate::arguments::RangesOptions;
 use crate::error::Error;
 use crate::numbers::{above_zero, number};
+use crate::track_options::TrackOptions;
 use fewbits_pf_mpa::{Height, RangeSettings};
 
 /// The law of signal strengths: `level - 10 exponent log10(distance)` and a shadowing in decibels.

@@ -3,7 +3,7 @@
 use super::accuracies::Accuracies;
 use super::anchors::{Anchor, together};
 use super::divisor::common_divisor;
-use super::instant::Instant;
+use super::level_options::report;
 use super::mistakes::{FIRST_RANGES, limited, mended, mistake, proportion};
 use super::odometry::Odometry;
 use super::path;
@@ -11,7 +11,6 @@ use super::range_settings::{Strengths, settings};
 use super::range_summary::{AnchorSummary, OFTEN, Summary, lines};
 use super::report::{first_cell, first_name, summarise};
 use super::rows::Instants;
-use super::sensors;
 use super::target::Target;
 use super::told::take_told;
 use crate::arguments::RangesOptions;
@@ -20,8 +19,8 @@ use crate::files::is_regular;
 use crate::numbers::short;
 use crate::output::{Cell, Shape, Sheet};
 use crate::plot::Thinned;
-use crate::report::Report;
 use fewbits_pf_mpa::{RangeEstimate, RangeTracker, Travel};
+use fewbits_tracking::{Instant, Report, Rows};
 use nalgebra::Vector3;
 
 /// Most ranges longer than the anchors are apart by this factor, or shorter, have another unit.
@@ -36,10 +35,14 @@ const FIRST_ROWS: usize = 600;
 
 /// The accuracies that the first rows of a file state.
 fn stated(instants: &mut Instants, file: &str) -> Result<Vec<f64>, Error> {
-    if instants.roles.any_accuracy().is_none() || !is_regular(file) {
+    if instants.source().roles.any_accuracy().is_none() || !is_regular(file) {
         return Ok(Vec::new());
     }
-    let stated = instants.peek(FIRST_ROWS)?.iter().flat_map(|row| &row.qualifiers);
+    let stated = instants
+        .peek(FIRST_ROWS)
+        .map_err(Error::tracking(file))?
+        .iter()
+        .flat_map(|row| &row.qualifiers);
     Ok(stated.filter_map(|one| one.accuracy).collect())
 }
 
@@ -82,14 +85,16 @@ pub(super) fn run(
     output: &mut Option<Sheet>,
 ) -> Result<(), Error> {
     let file = &options.anchors;
-    let travel = match sensors::parse(&options.send)? {
-        Report::Value | Report::Censored { .. } => Travel::Full,
+    let travel = match report(&options.send)? {
+        Report::Value => Travel::Full,
         Report::Sign => Travel::Bits(1),
         Report::Word { bits } => Travel::Bits(bits),
+        _ => return Err(Error::option("--send", &options.send, "`value`, `bit`, or `word:2` to `word:4`")),
     };
     let refused = Error::refused("the tracker of ranges is refused");
+    let failed = Error::tracking(instants.source().file());
     let mut settings = settings(options)?;
-    let mut hints = instants.roles.told.clone();
+    let mut hints = instants.source().roles.told.clone();
     let strengths = Strengths::of(options)?;
     hints.extend(together(anchors));
     hints.extend(take_told(options, anchors, &mut settings, &mut instants)?);
@@ -98,8 +103,8 @@ pub(super) fn run(
     let odometry = Odometry::new(options, anchors, &instants)?;
     let is_target = |name: &String| target.is_some_and(|target| target.all.contains(name));
     let is_stray = |name: &&String| known(name).is_none() && odometry.axis(name).is_none() && !is_target(name);
-    if let Some(name) = instants.names.iter().find(is_stray) {
-        return Err(unknown(instants.file(), name, file));
+    if let Some(name) = instants.names().iter().find(is_stray) {
+        return Err(unknown(instants.source().file(), name, file));
     }
     let axes = tracker.coordinates();
     let mut accuracies = Accuracies::of(stated(&mut instants, &options.table.file)?);
@@ -142,9 +147,9 @@ pub(super) fn run(
     let (mut long, mut small, mut between, mut far) = (0, 0, 0_u64, 0);
     let mut first: Vec<(f64, usize, f64)> = Vec::new();
     let (mut rounding, mut noise) = (0.0, f64::INFINITY);
-    while let Some(instant) = instants.next()? {
+    while let Some(instant) = instants.next().map_err(&failed)? {
         let (mut found, mut ranges, mut events) = (None, 0, "");
-        if let Some(by) = odometry.moved(&instant, &instants.names) {
+        if let Some(by) = odometry.moved(&instant, instants.names()) {
             let moved = tracker.moved(instant.seconds, &by);
             found = moved.map_err(|source| refused_row(&instants, &instant, source))?;
         }
@@ -153,7 +158,7 @@ pub(super) fn run(
             let Some(range) = range.filter(|range| range.is_finite() && !is_limit) else {
                 continue;
             };
-            let name = &instants.names[*sensor];
+            let name = &instants.names()[*sensor];
             if odometry.axis(name).is_some() {
                 continue;
             }
@@ -162,7 +167,7 @@ pub(super) fn run(
                     between += 1;
                     continue;
                 }
-                return Err(unknown(instants.file(), name, file));
+                return Err(unknown(instants.source().file(), name, file));
             };
             if range == 0.0 && !options.unknown_clock {
                 summary.zero += 1;
@@ -228,7 +233,7 @@ pub(super) fn run(
         let label = target.map(|target| Cell::Text(target.name.clone()));
         let cells = cells(found.as_ref(), axes);
         sheet.write(std::iter::once(first).chain(label).chain(cells).chain(last))?;
-        if instants.is_live() {
+        if instants.source().is_live() {
             sheet.flush()?;
         }
     }
@@ -245,7 +250,7 @@ pub(super) fn run(
         (anchor.works, anchor.own_bias, anchor.lasting) = asked.map_err(refused)?;
     }
     if summary.rows == 0 {
-        return Err(Error::empty(instants.file(), "rows"));
+        return Err(Error::empty(instants.source().file(), "rows"));
     }
     if let Some(file) = &options.plot {
         path::picture(anchors, places.points(), summary.ranges, summary.bits_per_range).save(file)?;
@@ -264,7 +269,7 @@ pub(super) fn run(
             "most ranges are many times {than} than the anchors are apart, {apart}: bring both to one unit, and take a constant delay off the ranges"
         ));
     }
-    summary.hints.extend(instants.strange_accuracies());
+    summary.hints.extend(instants.told());
     summary.hints.extend(accuracies.hint(noise));
     if between > 0 {
         summary
@@ -298,10 +303,10 @@ pub(super) fn run(
             "ranges are multiples of {step}: if they are rounded, their errors last while the target rests, and --anchor-bias {own} makes the band hold them"
         ));
     }
-    if instants.copies > 0 {
+    if instants.copies() > 0 {
         summary
             .hints
-            .push(format!("{} copies of reports were dropped", instants.copies));
+            .push(format!("{} copies of reports were dropped", instants.copies()));
     }
     let mut lines = lines(&summary, &tracker, settings, least);
     if let Some(target) = target {
@@ -322,7 +327,7 @@ fn farthest(anchors: &[Anchor]) -> f64 {
 
 fn refused_row(instants: &Instants, instant: &Instant, source: fewbits_pf_mpa::Error) -> Error {
     Error::Row {
-        file: instants.file().to_owned(),
+        file: instants.source().file().to_owned(),
         row: instant.row,
         source: Box::new(source),
     }

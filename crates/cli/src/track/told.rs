@@ -26,8 +26,11 @@ fn first(
     instants: &mut Instants,
 ) -> Result<Vec<(f64, String, f64)>, Error> {
     let strengths = Strengths::of(options)?;
-    let first = instants.peek(FIRST_ROWS)?.clone();
-    let names = &instants.names;
+    let first = instants
+        .peek(FIRST_ROWS)
+        .map_err(Error::tracking(&options.table.file))?
+        .clone();
+    let names = instants.names();
     let mut ranges = Vec::new();
     for instant in &first {
         for (i, (sensor, range)) in instant.reports.iter().enumerate() {
@@ -96,9 +99,11 @@ pub(super) fn take_told(
 ) -> Result<Vec<String>, Error> {
     let mut said = Vec::new();
     if is_regular(&options.table.file) {
-        let old = instants.leave_out_old(FIRST_ROWS)?;
+        let old = instants
+            .leave_out_old(FIRST_ROWS)
+            .map_err(Error::tracking(&options.table.file))?;
         if !old.is_empty() {
-            let names: Vec<&str> = old.iter().map(|i| instants.names[*i].as_str()).collect();
+            let names: Vec<&str> = old.iter().map(|i| instants.names()[*i].as_str()).collect();
             said.push(format!(
                 "ranges of {} that repeat the one before are left out: the table holds them until there is a new one",
                 names.join(", ")
@@ -122,7 +127,7 @@ pub(super) fn take_told(
         };
         let mut found = height(*settings);
         // A height that is not known makes errors that depend on the distance too, and rows may state theirs.
-        let grows_by = |settings| proportion(settings).filter(|_| instants.roles.any_accuracy().is_none());
+        let grows_by = |settings| proportion(settings).filter(|_| instants.source().roles.any_accuracy().is_none());
         if let Some((noise, proportional)) = grows_by(at(*settings, found)) {
             said.push(grows(noise, "taken, as"));
             *settings = RangeSettings {
