@@ -31,6 +31,11 @@ impl<T> PerColumn<T> {
         bounds::PerColumn::parse(text, others, parse_one).map(Self)
     }
 
+    /// The names with their values, and the value of all other columns.
+    pub(crate) fn into_parts(self) -> (Vec<(String, T)>, T) {
+        self.0.into_parts()
+    }
+
     /// The value for a column.
     pub(crate) fn of(&self, name: &str) -> &T {
         self.0.of(name)

@@ -9,11 +9,12 @@ use crate::numbers::{column, short};
 use crate::output;
 use crate::plot::{Layer, Picture};
 use crate::say::say;
-use crate::track::applied::{Found, Sensor};
+use crate::track::calibration;
 use fewbits_quantizer_design::solve::Rounded;
 use fewbits_quantizer_design::{AllowedCells, Prior, Progress, Solution};
 use fewbits_recipes::{self as recipe, design};
 use fewbits_record::TimeBase;
+use fewbits_tracking::CalibratedSensor;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;
 use std::ops::ControlFlow;
@@ -129,9 +130,9 @@ fn applied(options: &DesignOptions) -> Result<DesignOptions, Error> {
     let Some(path) = &options.settings else {
         return Ok(options);
     };
-    let found = Found::read(path)?;
+    let found = calibration::read(path)?;
     if options.noise.is_empty() {
-        options.noise = found.sensors.iter().map(Sensor::noise).collect();
+        options.noise = found.sensors.iter().map(CalibratedSensor::noise).collect();
         for (number, sensor) in found.sensors.iter().enumerate() {
             let model = &sensor.model;
             let reads = match sensor.threshold {
@@ -153,7 +154,7 @@ fn applied(options: &DesignOptions) -> Result<DesignOptions, Error> {
         }
     }
     if options.file.is_none() && options.prior.is_none() {
-        options.prior = found.prior_option();
+        options.prior = found.prior().map(|(mean, deviation)| format!("{mean}±{deviation}"));
         if options.prior.is_none() {
             return Err(Error::Needed {
                 option: "a FILE or --prior",

@@ -197,6 +197,35 @@ impl Error {
         }
     }
 
+    /// An error of tracking the rows of this file. What the source of rows reported stays as it was.
+    pub(crate) fn tracking(file: &str) -> impl Fn(fewbits_tracking::Error) -> Self + use<> {
+        use fewbits_tracking::Error as Refusal;
+        let file = file.to_owned();
+        move |source| match source {
+            Refusal::Source(failure) => match failure.downcast::<Self>() {
+                Ok(error) => *error,
+                Err(failure) => Self::content(&file, failure),
+            },
+            Refusal::Empty => Self::empty(&file, "rows"),
+            Refusal::Argument {
+                argument,
+                value,
+                expected,
+            } => Self::option(option(argument), &value, expected),
+            Refusal::Needed { argument, reason } => Self::Needed {
+                option: option(argument),
+                reason,
+            },
+            Refusal::Row { row, source } => Self::Row {
+                file: file.clone(),
+                row,
+                source,
+            },
+            Refusal::Refused { what, source } => Self::Refused { what, source },
+            problem => Self::content(&file, problem),
+        }
+    }
+
     pub(crate) fn of_table(file: &str) -> impl Fn(fewbits_table::Error) -> Self + use<> {
         let file = file.to_owned();
         move |source| Self::Refusal {
@@ -252,5 +281,23 @@ impl Error {
             _ => return false,
         };
         kind == io::ErrorKind::BrokenPipe
+    }
+}
+
+/// The option that states an argument of tracking.
+fn option(argument: &'static str) -> &'static str {
+    match argument {
+        "change" => "--change",
+        "height" => "--height",
+        "noise" => "--noise",
+        "period" => "--period",
+        "prior" => "--prior",
+        "rounded" => "--rounded",
+        "send" => "--send",
+        "silent_within" => "--silent-within",
+        "slope" => "--slope",
+        "odometry" => "--odometry",
+        "start" => "`start` in the file of rooms",
+        other => other,
     }
 }

@@ -54,6 +54,7 @@ mod table_options;
 mod target;
 mod towards;
 mod track;
+mod track_options;
 mod unpack;
 mod verify;
 mod waiting;

@@ -2,6 +2,8 @@
 
 use crate::error::Error;
 
+pub(crate) use fewbits_tracking::short;
+
 /// Parses a finite number.
 pub(crate) fn number(option: &'static str, text: &str, expected: &'static str) -> Result<f64, Error> {
     let number: Option<f64> = text.trim().parse().ok();
@@ -54,44 +56,14 @@ pub(crate) fn column(number: f64) -> String {
     }
 }
 
-/// A number with at most four digits, for sizes in messages.
-pub(crate) fn short(number: f64) -> String {
-    if number == 0.0 || (1e-4..1e7).contains(&number.abs()) {
-        let digits = if number == 0.0 {
-            0
-        } else {
-            (3 - number.abs().log10().floor() as i32).max(0) as usize
-        };
-        let text = format!("{number:.digits$}");
-        if text.contains('.') {
-            return text.trim_end_matches('0').trim_end_matches('.').to_owned();
-        }
-        return text;
-    }
-    format!("{number:.3e}")
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{exact, short};
+    use super::exact;
 
     #[test]
     fn all_digits_without_rows_of_zeros() {
         for (number, text) in [(0.0, "0"), (-20.125, "-20.125"), (1e308, "1e308"), (2.5e-9, "2.5e-9")] {
             assert_eq!(exact(number), text);
-        }
-    }
-
-    #[test]
-    fn sizes_in_few_digits() {
-        for (number, text) in [
-            (0.0, "0"),
-            (0.09500000000000242, "0.095"),
-            (120.0, "120"),
-            (12345.6, "12346"),
-            (3.2e-9, "3.200e-9"),
-        ] {
-            assert_eq!(short(number), text);
         }
     }
 }

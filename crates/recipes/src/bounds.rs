@@ -88,6 +88,11 @@ impl<T> PerColumn<T> {
         Ok(found)
     }
 
+    /// The columns that the text names with their values, and the value of all others.
+    pub fn into_parts(self) -> (Vec<(String, T)>, T) {
+        (self.named, self.others)
+    }
+
     /// The value for a column.
     pub fn of(&self, name: &str) -> &T {
         let named = self.named.iter().find(|(known, _)| known == name);

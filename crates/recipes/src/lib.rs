@@ -44,8 +44,6 @@
 //! | rows out of a recording | [`unpack`] |
 //! | a recording against its table | [`verify`] |
 //! | quantizers for an unknown that several sensors measure | [`design`] |
-//! | the step to which values are rounded | [`rounding`] |
-//! | readings that state their own accuracy, rounding and limits | [`stated`] |
 //!
 //! Not here: files, printing and options (`fewbits-cli`), the format (`fewbits-record`), how values are predicted and coded
 //! (`fewbits-adaptive`).
@@ -57,9 +55,7 @@ pub mod look;
 pub mod names;
 pub mod pack;
 pub mod plan;
-pub mod rounding;
 pub mod source;
-pub mod stated;
 pub mod table;
 pub mod times;
 pub mod unpack;

@@ -4,17 +4,18 @@ use super::entries::{Entry, Model, Prior};
 use crate::error::Error;
 use crate::measured::Measured;
 use crate::report::Report;
-use crate::track::applied::Found;
+use crate::track::calibration;
+use fewbits_tracking::Calibration;
 use std::path::Path;
 
 /// Reads the file, and says what a centre does not follow.
-pub(super) fn read(path: &Path) -> Result<Found, Error> {
-    let found = Found::read(path)?;
-    found.say_uncorrected(path, true);
+pub(super) fn read(path: &Path) -> Result<Calibration, Error> {
+    let found = calibration::read(path)?;
+    calibration::say_uncorrected(&found, path, &[], true);
     Ok(found)
 }
 
-pub(super) fn model(found: &Found) -> Model {
+pub(super) fn model(found: &Calibration) -> Model {
     match found.time_constant {
         Some(time_constant) => Model::OrnsteinUhlenbeck {
             mean: found.mean,
@@ -27,7 +28,7 @@ pub(super) fn model(found: &Found) -> Model {
     }
 }
 
-pub(super) fn prior(found: &Found) -> Option<Prior> {
+pub(super) fn prior(found: &Calibration) -> Option<Prior> {
     let (mean, deviation) = found.prior()?;
     Some(Prior {
         mean: vec![mean],
@@ -36,7 +37,7 @@ pub(super) fn prior(found: &Found) -> Option<Prior> {
 }
 
 /// What an entry says that its sensors measure; what it does not say, the sensor of its name in the file.
-pub(super) fn measured(entry: &Entry, found: Option<&Found>) -> Result<Measured, String> {
+pub(super) fn measured(entry: &Entry, found: Option<&Calibration>) -> Result<Measured, String> {
     let own = match (&entry.name, found) {
         (Some(name), Some(found)) => {
             let sensors = || found.sensors.iter();

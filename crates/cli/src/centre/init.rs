@@ -7,8 +7,8 @@ use crate::arguments::CentreOptions;
 use crate::error::Error;
 use crate::report::Report;
 use crate::say::say;
-use crate::track::applied::Found;
 use fewbits_link::{FleetKey, write_private};
+use fewbits_tracking::Calibration;
 use std::io::Read;
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use std::path::Path;
 const KEY_BYTES: usize = 32;
 
 /// What moves, what is known of it, and the sensors, in words that a person edits. `settings`: the file of `fit`, as the configuration names it.
-fn world(sensors: u32, settings: Option<(&str, &Found)>) -> String {
+fn world(sensors: u32, settings: Option<(&str, &Calibration)>) -> String {
     const MODELS: &str = "# How the state moves: random-walk (density), ornstein-uhlenbeck (mean, time_constant, variance),\n\
         # constant-velocity (density), constant-velocity2d (density).\n";
     const PRIOR: &str = "# What is known before the first slot, per coordinate of the state.\n\
@@ -48,7 +48,7 @@ fn world(sensors: u32, settings: Option<(&str, &Found)>) -> String {
     text
 }
 
-fn template(sensors: u32, settings: Option<(&str, &Found)>) -> String {
+fn template(sensors: u32, settings: Option<(&str, &Calibration)>) -> String {
     format!(
         r#"# A fusion centre: run it with `fewbits centre FILE`, check it with `fewbits check FILE`.
 

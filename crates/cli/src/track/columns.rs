@@ -1,6 +1,6 @@
 //! Which columns of a table are no sensors.
 
-use super::meaning::silence;
+use super::level_options::silence;
 use crate::arguments::{TableOptions, TrackOptions};
 use crate::error::Error;
 use crate::input::Table;

@@ -1,8 +1,8 @@
 //! Which columns of a table are sensors, and which qualify their values.
 
-use super::instant::Qualifier;
 use crate::error::Error;
 use fewbits_table::Side;
+use fewbits_tracking::Qualifier;
 
 /// Places of the columns.
 pub(super) struct OwnColumns {

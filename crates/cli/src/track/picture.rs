@@ -1,8 +1,8 @@
 //! The picture of a level: band, values, estimates.
 
-use super::report::BAND;
-use crate::arguments::TrackOptions;
+use super::report::{BAND, value_of};
 use crate::plot::{Layer, Picture, Thinned};
+use crate::track_options::TrackOptions;
 
 pub(super) struct Picked {
     pub(super) seconds: f64,
@@ -20,7 +20,7 @@ impl Drawn {
     /// `has_full`: whether there are estimates from values in full.
     pub(super) fn picture(&self, options: &TrackOptions, title: String, has_full: bool) -> Picture {
         let points = self.path.points();
-        let value = |number: f64| options.transform.map_or(number, |transform| transform.inverse(number));
+        let value = |number: f64| value_of(options.transform, number);
         let edge = |sign: f64| {
             let at = |picked: &Picked| (picked.seconds, value(picked.estimate.0 + sign * BAND * picked.estimate.1));
             points.iter().map(at).collect::<Vec<_>>()

@@ -1,37 +1,29 @@
 //! Conversion of rows of a table to instants: what each sensor reported at one time.
 
-use super::applied::{Correction, correct};
 use super::columns::{Finds, Kind, Roles};
-use super::held::Held;
-use super::instant::{Instant, Qualifier, Reports};
-use super::late::Late;
 use super::own_columns::OwnColumns;
-use super::samples::Samples;
 use super::seconds::Seconds;
 use super::target::OfTarget;
-use super::transform::Transform;
 use crate::arguments::TableOptions;
 use crate::clock;
 use crate::error::Error;
 use crate::files::is_regular;
 use crate::input::Table;
 use fewbits_record::TimeBase;
-use std::collections::VecDeque;
+use fewbits_tracking::{Failure, Instant, RowOptions, Rows};
 
 /// Smallest number of seconds that is proposed for rows that come late.
 const LATE: f64 = 60.0;
 /// Seconds by which clocks are set back in autumn.
 const HOUR: f64 = 3600.0;
 
-/// A table as instants.
-pub(super) struct Instants {
+/// A table whose rows are instants.
+pub(super) struct TableRows {
     table: Table,
     base: TimeBase,
     is_long: bool,
     /// What was found of its columns.
     pub(super) roles: Roles,
-    /// Whether a sensor that does not report at an instant has an empty cell there, though each row is a report.
-    pub(super) is_filled: bool,
     /// Whether cells may be limits, as `<0.25`.
     pub(super) has_limits: bool,
     own: OwnColumns,
@@ -41,30 +33,35 @@ pub(super) struct Instants {
     step: f64,
     next_number: i64,
     /// Names of the sensors so far.
-    pub(super) names: Vec<String>,
-    /// Number of rows that were dropped because they repeat one of the same time.
-    pub(super) copies: u64,
-    /// What is corrected in the values of a sensor.
-    corrections: Vec<Correction>,
-    transform: Option<Transform>,
-    /// Time and cells of the last row.
-    before: Option<(f64, Reports)>,
-    /// Rows that were read ahead.
-    ahead: VecDeque<Instant>,
-    /// The row after an instant that has several rows.
-    pending: Option<Instant>,
-    /// Rows that wait for those that are late.
-    late: Late,
-    /// Measurements between rows.
-    samples: Option<Samples>,
-    /// What is left out of rows because it only repeats.
-    held: Option<Held>,
+    names: Vec<String>,
+    /// Whether rows may be late.
+    may_be_late: bool,
     /// The rows that are taken, if not all are.
-    pub(super) only: Option<OfTarget>,
+    only: Option<OfTarget>,
 }
 
-impl Instants {
-    pub(super) fn open(options: &TableOptions, kind: &Kind) -> Result<Self, Error> {
+/// The instants of a table.
+pub(super) type Instants = fewbits_tracking::Instants<TableRows>;
+
+/// Opens a table. `only`: the rows that are taken, if not all are.
+pub(super) fn open(options: &TableOptions, kind: &Kind, only: Option<OfTarget>) -> Result<Instants, Error> {
+    let rows = TableRows {
+        only,
+        ..TableRows::open(options, kind)?
+    };
+    let options = RowOptions {
+        single_reports: rows.is_long,
+        filled: kind.is_filled,
+        late: kind.late,
+        sampled: kind.sampled,
+        numbered: !rows.has_time(),
+        ..RowOptions::default()
+    };
+    Ok(Instants::new(rows, options))
+}
+
+impl TableRows {
+    fn open(options: &TableOptions, kind: &Kind) -> Result<Self, Error> {
         let mut chosen = options.clone();
         // Each row is a report by itself: an instant may have several of one sensor.
         chosen.by = None;
@@ -114,7 +111,6 @@ impl Instants {
             is_long: roles.by.is_some(),
             roles,
             has_limits,
-            is_filled: kind.is_filled,
             own,
             seconds: Seconds::new(base, table.is_of_day()),
             table,
@@ -122,26 +118,9 @@ impl Instants {
             last: 0.0,
             step: 0.0,
             next_number: 0,
-            copies: 0,
-            corrections: Vec::new(),
-            transform: None,
-            before: None,
-            ahead: VecDeque::new(),
-            pending: None,
-            late: Late::new(kind.late),
-            samples: kind.sampled.map(Samples::new),
-            held: None,
+            may_be_late: kind.late > 0.0,
             only: None,
         })
-    }
-
-    /// The same rows with corrected values, or functions of them.
-    pub(super) fn corrected(self, corrections: Vec<Correction>, transform: Option<Transform>) -> Self {
-        Self {
-            corrections,
-            transform,
-            ..self
-        }
     }
 
     /// The name of the table in messages.
@@ -149,16 +128,11 @@ impl Instants {
         self.table.file()
     }
 
-    /// Whether rows may come one by one: [`Table::is_live`].
-    pub(super) fn is_live(&self) -> bool {
-        self.table.is_live()
-    }
-
     /// What was made of accuracies that are none, and of numbers that stand for gaps, a line each.
-    pub(super) fn strange_accuracies(&self) -> Vec<String> {
+    fn strange_accuracies(&self) -> Vec<String> {
         let name = self.roles.any_accuracy().map_or("", String::as_str);
         let [unknown, void] = self.own.strange;
-        let mut lines: Vec<String> = self.held.iter().flat_map(|held| held.hints(&self.names)).collect();
+        let mut lines = Vec::new();
         if unknown > 0 {
             lines.push(format!(
                 "{name} is 0 or below in {unknown} rows: their values have the noise of the sensor; if it marks values that are void, leave those \
@@ -176,147 +150,6 @@ impl Instants {
         self.base != TimeBase::Numbered
     }
 
-    /// Reads up to `count` instants without consuming them.
-    pub(super) fn peek(&mut self, count: usize) -> Result<&VecDeque<Instant>, Error> {
-        while self.ahead.len() < count {
-            match self.read_new()? {
-                Some(instant) => self.ahead.push_back(instant),
-                None => break,
-            }
-        }
-        Ok(&self.ahead)
-    }
-
-    /// The next instant.
-    pub(super) fn next(&mut self) -> Result<Option<Instant>, Error> {
-        match self.ahead.pop_front() {
-            Some(instant) => Ok(Some(instant)),
-            None => self.read_new(),
-        }
-    }
-
-    /// Leaves repetitions of columns that hold their values out of the rows that were read ahead and of all that follow. The sensors.
-    pub(super) fn leave_out_repetitions(&mut self) -> Vec<usize> {
-        self.held = Some(Held::begin(&mut self.ahead, self.names.len()));
-        self.held.iter().flat_map(Held::sensors).collect()
-    }
-
-    /// The same of repetitions alone, from so many first rows.
-    pub(super) fn leave_out_old(&mut self, count: usize) -> Result<Vec<usize>, Error> {
-        self.peek(count)?;
-        let held = Held::of_repetitions(&mut self.ahead, self.names.len());
-        let found: Vec<usize> = held.sensors().collect();
-        self.held = Some(held).filter(|_| !found.is_empty());
-        Ok(found)
-    }
-
-    fn read_new(&mut self) -> Result<Option<Instant>, Error> {
-        let mut found = self.read_with_samples()?;
-        if let (Some(held), Some(row)) = (&mut self.held, &mut found) {
-            held.leave_out(row);
-        }
-        Ok(found)
-    }
-
-    /// Whether instants without a row are among those that are read.
-    pub(super) fn has_samples(&self) -> bool {
-        self.samples.is_some()
-    }
-
-    fn read_with_samples(&mut self) -> Result<Option<Instant>, Error> {
-        let Some(mut samples) = self.samples.take() else {
-            return self.read();
-        };
-        let mut found = samples.next();
-        if found.is_none()
-            && let Some(instant) = self.read()?
-        {
-            samples.add(instant);
-            found = samples.next();
-        }
-        self.samples = Some(samples);
-        Ok(found)
-    }
-
-    fn read(&mut self) -> Result<Option<Instant>, Error> {
-        let Some(mut instant) = self
-            .pending
-            .take()
-            .map_or_else(|| self.read_row(), |row| Ok(Some(row)))?
-        else {
-            return Ok(None);
-        };
-        // Rows of one time are one instant, if each row is a report.
-        while self.is_long {
-            match self.read_row()? {
-                Some(row) if row.seconds == instant.seconds => {
-                    // A message that is delivered twice is one report.
-                    if row.reports.iter().all(|report| instant.reports.contains(report)) {
-                        self.copies += 1;
-                    } else {
-                        instant.reports.extend(row.reports);
-                        instant.qualifiers.extend(row.qualifiers);
-                    }
-                }
-                row => {
-                    self.pending = row;
-                    break;
-                }
-            }
-        }
-        if self.is_long && self.is_filled {
-            for sensor in 0..self.names.len() {
-                if instant.reports.iter().all(|(other, _)| *other != sensor) {
-                    instant.reports.push((sensor, None));
-                    instant.qualifiers.push(Qualifier::default());
-                }
-            }
-        }
-        Ok(Some(instant))
-    }
-
-    /// The next row that is not a copy of the one before.
-    fn read_row(&mut self) -> Result<Option<Instant>, Error> {
-        loop {
-            let row = self.read_sorted_row()?;
-            let is_copy = self.has_time()
-                && row
-                    .as_ref()
-                    .is_some_and(|row| self.before.as_ref() == Some(&(row.seconds, row.reports.clone())));
-            if is_copy {
-                self.copies += 1;
-                continue;
-            }
-            self.before = row.as_ref().map(|row| (row.seconds, row.reports.clone()));
-            return Ok(row);
-        }
-    }
-
-    /// The next row in the order of time, if rows may be late.
-    fn read_sorted_row(&mut self) -> Result<Option<Instant>, Error> {
-        if !self.late.is_waiting() {
-            return self.read_any_row();
-        }
-        loop {
-            if let Some(found) = self.late.pop() {
-                return found.map(Some).map_err(|row| {
-                    let problem = format!(
-                        "row {}: time {} is before that of a row that was used: a longer --late takes it in, as --late {}s",
-                        row.row,
-                        row.time,
-                        self.late.lateness(&row).ceil()
-                    );
-                    Error::content(self.file(), problem)
-                });
-            }
-            match self.read_any_row()? {
-                Some(row) => self.late.push(row),
-                None if self.late.end() => return Ok(None),
-                None => {}
-            }
-        }
-    }
-
     /// How late the latest row is, of one at this time and those that follow it. The rest of a pipe is not waited for.
     fn latest(&mut self, seconds: f64) -> f64 {
         let (mut newest, mut latest) = (self.last, self.last - seconds);
@@ -330,7 +163,7 @@ impl Instants {
         latest
     }
 
-    fn read_any_row(&mut self) -> Result<Option<Instant>, Error> {
+    fn read(&mut self) -> Result<Option<Instant>, Error> {
         let (tick, cells, row) = loop {
             let Some((tick, cells)) = self.table.next(self.base)? else {
                 return Ok(None);
@@ -342,7 +175,7 @@ impl Instants {
                 break (tick, cells, row);
             }
         };
-        let may_be_late = self.late.is_waiting();
+        let may_be_late = self.may_be_late;
         let (tick, seconds) = self.seconds.of(tick, may_be_late, row, self.table.file());
         let time = clock::shown(tick, self.base);
         if seconds < self.last && !may_be_late {
@@ -366,7 +199,7 @@ impl Instants {
         let qualifier = |place: &usize| self.own.qualifier(*place, &cells, limit(*place));
         let qualifiers = self.own.sensors.iter().map(qualifier).collect();
         let cells = self.own.values(&cells).into_iter();
-        let mut reports: Reports = if self.is_long {
+        let reports = if self.is_long {
             let label = self.table.label();
             let known = self.names.iter().position(|name| name == label);
             let sensor = known.unwrap_or_else(|| {
@@ -377,11 +210,6 @@ impl Instants {
         } else {
             cells.enumerate().map(|(sensor, (_, cell))| (sensor, cell)).collect()
         };
-        correct(&self.corrections, &mut reports, &self.names, seconds);
-        if let Some(transform) = self.transform {
-            let wrong = |problem| Error::content(self.file(), format_args!("row {row}: {problem}"));
-            transform.apply(&mut reports, &self.names).map_err(wrong)?;
-        }
         Ok(Some(Instant {
             seconds,
             time,
@@ -390,5 +218,28 @@ impl Instants {
             qualifiers,
             reports,
         }))
+    }
+}
+
+impl Rows for TableRows {
+    fn next(&mut self) -> Result<Option<Instant>, Failure> {
+        Ok(self.read()?)
+    }
+
+    fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// [`Table::is_live`].
+    fn is_live(&self) -> bool {
+        self.table.is_live()
+    }
+
+    fn found(&self) -> &[String] {
+        &self.roles.told
+    }
+
+    fn told(&self) -> Vec<String> {
+        self.strange_accuracies()
     }
 }
