@@ -38,24 +38,16 @@ impl From<Config> for Stored {
 impl TryFrom<Stored> for Config {
     type Error = ArgumentError;
 
-    fn try_from(
-        Stored {
-            delta,
-            period,
-            sequence_bits,
-            refresh_every,
-            exact,
-        }: Stored,
-    ) -> Result<Self, ArgumentError> {
-        let mut config = Config::new(delta)?;
-        if exact {
+    fn try_from(stored: Stored) -> Result<Self, ArgumentError> {
+        let mut config = Config::new(stored.delta)?;
+        if stored.exact {
             config = config.made_exact();
         }
-        if let Some(period) = period {
+        if let Some(period) = stored.period {
             config = config.circular(period)?;
         }
-        if sequence_bits > 0 {
-            config = config.resilient(sequence_bits, refresh_every)?;
+        if stored.sequence_bits > 0 {
+            config = config.resilient(stored.sequence_bits, stored.refresh_every)?;
         }
         Ok(config)
     }

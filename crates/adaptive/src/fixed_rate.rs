@@ -42,13 +42,17 @@ const TURNS: usize = 4;
 /// # Ok::<(), fewbits_adaptive::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredFixedRate", into = "StoredFixedRate")]
+#[serde(try_from = "StoredFixedRate")]
 pub struct FixedRate {
     bits: u32,
     unit: f64,
+    #[serde(skip_serializing)]
     noise_variance: f64,
+    #[serde(skip_serializing)]
     models: Switching<LinearGaussian<2, 1>>,
+    #[serde(skip_serializing)]
     filter: Imm<2, MomentFilter>,
+    #[serde(skip_serializing)]
     sensor: LinearSensor<2, 1>,
     belief: ImmBelief<2>,
     /// Number of slots so far, modulo [`TURNS`].
@@ -78,8 +82,8 @@ impl Message for Word {
 }
 
 /// The stored form of [`FixedRate`].
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Deserialize)]
+#[serde(rename = "FixedRate", deny_unknown_fields)]
 struct StoredFixedRate {
     bits: u32,
     unit: f64,
@@ -87,37 +91,19 @@ struct StoredFixedRate {
     turn: usize,
 }
 
-impl From<FixedRate> for StoredFixedRate {
-    fn from(rate: FixedRate) -> Self {
-        Self {
-            bits: rate.bits,
-            unit: rate.unit,
-            belief: rate.belief,
-            turn: rate.turn,
-        }
-    }
-}
-
 impl TryFrom<StoredFixedRate> for FixedRate {
     type Error = Error;
 
-    fn try_from(
-        StoredFixedRate {
-            bits,
-            unit,
-            belief,
-            turn,
-        }: StoredFixedRate,
-    ) -> Result<Self, Error> {
-        let rate = FixedRate::new(bits, unit, 0.0)?;
-        let models = rate.belief.modes().len();
-        if belief.modes().len() != models {
+    fn try_from(stored: StoredFixedRate) -> Result<Self, Error> {
+        let rate = FixedRate::new(stored.bits, stored.unit, 0.0)?;
+        let (found, models) = (stored.belief.modes().len(), rate.belief.modes().len());
+        if found != models {
             let expected = format!("{models}, one for each model");
-            return Err(ArgumentError::new("belief", format!("{} Gaussians", belief.modes().len()), expected).into());
+            return Err(ArgumentError::new("belief", format!("{found} Gaussians"), expected).into());
         }
         Ok(FixedRate {
-            belief,
-            turn: turn % TURNS,
+            belief: stored.belief,
+            turn: stored.turn % TURNS,
             ..rate
         })
     }

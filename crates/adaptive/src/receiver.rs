@@ -27,7 +27,7 @@ pub struct Tracked {
 /// refresh that arrives the error is not bounded. With a refresh every `R` slots that is at most `R - 1` slots, plus `R` for each
 /// scheduled refresh that is lost too.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Stored", into = "Stored")]
+#[serde(try_from = "Stored")]
 pub struct Receiver {
     config: Config,
     replica: Option<Replica>,
@@ -38,7 +38,7 @@ pub struct Receiver {
 }
 
 /// The stored form of [`Receiver`].
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(rename = "Receiver", deny_unknown_fields)]
 struct Stored {
     config: Config,
@@ -48,40 +48,24 @@ struct Stored {
     synchronised: bool,
 }
 
-impl From<Receiver> for Stored {
-    fn from(receiver: Receiver) -> Self {
-        Self {
-            config: receiver.config,
-            replica: receiver.replica,
-            slot: receiver.slot,
-            sequence: receiver.sequence,
-            synchronised: receiver.synchronised,
-        }
-    }
-}
-
 impl TryFrom<Stored> for Receiver {
     type Error = ArgumentError;
 
     fn try_from(stored: Stored) -> Result<Self, ArgumentError> {
-        let Stored {
-            config,
-            replica,
-            slot,
-            sequence,
-            synchronised,
-        } = stored;
-        if replica.as_ref().is_some_and(|replica| !replica.is_valid(&config.0)) {
+        let config = stored.config;
+        if stored
+            .replica
+            .as_ref()
+            .is_some_and(|replica| !replica.is_valid(&config.0))
+        {
             return Err(ArgumentError::new("replica", "inconsistent", "the state that was stored"));
         }
-        let synchronised = synchronised && replica.is_some();
-        let sequence = sequence & ((1 << config.sequence_bits()) - 1);
         Ok(Receiver {
             config,
-            replica,
-            slot,
-            sequence,
-            synchronised,
+            synchronised: stored.synchronised && stored.replica.is_some(),
+            replica: stored.replica,
+            slot: stored.slot,
+            sequence: stored.sequence & ((1 << config.sequence_bits()) - 1),
         })
     }
 }

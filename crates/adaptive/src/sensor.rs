@@ -68,14 +68,8 @@ impl TryFrom<Stored> for Sensor {
     type Error = ArgumentError;
 
     fn try_from(stored: Stored) -> Result<Self, ArgumentError> {
-        let Stored {
-            config,
-            replica,
-            slot,
-            sequence,
-            refresh_requested,
-        } = stored;
-        let encoder = Encoder::restored(config.0, replica, slot, sequence, refresh_requested)?;
+        let (config, requested) = (stored.config, stored.refresh_requested);
+        let encoder = Encoder::restored(config.0, stored.replica, stored.slot, stored.sequence, requested)?;
         Ok(Sensor { config, encoder })
     }
 }

@@ -1,7 +1,6 @@
 //! Bounds of the error after several hand-overs, from the losses of each.
 
-use crate::mixture_codec::divergence::{kl_from_dr, l1_from_dr};
-use fewbits_mixture_codec::divergence::Divergence;
+use crate::mixture_codec::divergence::{Divergence, kl_from_dr, l1_from_dr};
 use fewbits_numerics::LogSum;
 
 /// The sum in the exponent of the amplification `A_i = 2 sum_{j<i}`.

@@ -11,6 +11,7 @@ use crate::sensing::Sensing;
 use crate::value_update;
 use fewbits_numerics::error::refuse;
 use nalgebra::{SMatrix, SVector};
+use std::ops::Deref;
 
 /// The likelihood of an observation, `ln p(observed | x)`: it weighs particles and grids, and updates Gaussians where it can. Object-safe.
 ///
@@ -114,7 +115,11 @@ pub struct LinearScalar<const D: usize> {
     pub factor: Scalar,
 }
 
-impl<const D: usize, L: Likelihood<D> + ?Sized> Likelihood<D> for &L {
+/// References, boxes and vectors, as what they point to.
+impl<const D: usize, P> Likelihood<D> for P
+where
+    P: Deref<Target: Likelihood<D>> + Send + Sync,
+{
     fn log_likelihood(&self, state: &SVector<f64, D>) -> f64 {
         (**self).log_likelihood(state)
     }
@@ -205,33 +210,6 @@ impl<const D: usize, L: Likelihood<D>> Likelihood<D> for [L] {
 
     fn reads(&self, state: &SVector<f64, D>, axis: usize) -> bool {
         self.iter().any(|observed| observed.reads(state, axis))
-    }
-}
-
-/// Independent observations at one instant: log likelihoods add.
-impl<const D: usize, L: Likelihood<D>> Likelihood<D> for Vec<L> {
-    fn log_likelihood(&self, state: &SVector<f64, D>) -> f64 {
-        self.as_slice().log_likelihood(state)
-    }
-
-    fn add_log_likelihoods(&self, states: Columns<'_, D>, log_weights: &mut [f64]) {
-        self.as_slice().add_log_likelihoods(states, log_weights);
-    }
-
-    fn condition(&self, belief: &mut Gaussian<D>) -> Result<Evidence, Error> {
-        self.as_slice().condition(belief)
-    }
-
-    fn move_points(&self, states: ColumnsMut<'_, D>, weights: &[f64]) -> Result<Evidence, Error> {
-        self.as_slice().move_points(states, weights)
-    }
-
-    fn as_constant(&self) -> Option<f64> {
-        self.as_slice().as_constant()
-    }
-
-    fn reads(&self, state: &SVector<f64, D>, axis: usize) -> bool {
-        self.as_slice().reads(state, axis)
     }
 }
 

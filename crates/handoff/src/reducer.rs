@@ -5,6 +5,7 @@ use fewbits_core::{BitString, CodecError, Message};
 use fewbits_densities::{KernelEstimate, Mixture};
 use fewbits_mixture_codec::Reduction;
 use fewbits_mixture_codec::wire::{CodedMixture, RateControl, WireFormat};
+use std::ops::Deref;
 
 /// A belief as the next leader receives it, and the message in which it was received.
 ///
@@ -66,13 +67,8 @@ pub trait Reducer<const D: usize> {
     fn reduce(&self, estimate: &KernelEstimate<D>) -> Result<Handover<D>, Error>;
 }
 
-impl<const D: usize, R: Reducer<D> + ?Sized> Reducer<D> for &R {
-    fn reduce(&self, estimate: &KernelEstimate<D>) -> Result<Handover<D>, Error> {
-        (**self).reduce(estimate)
-    }
-}
-
-impl<const D: usize, R: Reducer<D> + ?Sized> Reducer<D> for Box<R> {
+/// References and boxes, as what they point to.
+impl<const D: usize, P: Deref<Target: Reducer<D>>> Reducer<D> for P {
     fn reduce(&self, estimate: &KernelEstimate<D>) -> Result<Handover<D>, Error> {
         (**self).reduce(estimate)
     }

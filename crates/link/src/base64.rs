@@ -1,49 +1,32 @@
-//! Base64 of RFC 4648, section 4.
+//! Base64 of RFC 4648: section 4, and section 5 for names and addresses.
 
-const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+use ::base64::Engine;
+use ::base64::prelude::{BASE64_STANDARD, BASE64_STANDARD_NO_PAD, BASE64_URL_SAFE_NO_PAD};
 
 /// The text of bytes, with padding.
 pub(crate) fn encode(bytes: &[u8]) -> String {
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for group in bytes.chunks(3) {
-        let byte = |i: usize| u32::from(group.get(i).copied().unwrap_or(0));
-        let word = byte(0) << 16 | byte(1) << 8 | byte(2);
-        for i in 0..4 {
-            // Of one byte two digits are needed, of two bytes three.
-            text.push(match i <= group.len() {
-                true => char::from(DIGITS[(word >> (18 - 6 * i) & 63) as usize]),
-                false => '=',
-            });
-        }
-    }
-    text
+    BASE64_STANDARD.encode(bytes)
 }
 
-/// The bytes of a text, with or without padding; `None` if it is not base64.
+/// The bytes of a text with or without padding. `None` if it is no base64, or not the one text of its bytes.
 pub(crate) fn decode(text: &str) -> Option<Vec<u8>> {
-    let digits = text.trim_end_matches('=');
-    if text.len() - digits.len() > 2
-        || digits.len() % 4 == 1
-        || (text.len() > digits.len() && !text.len().is_multiple_of(4))
-    {
-        return None;
-    }
-    let mut bytes = Vec::with_capacity(digits.len() * 3 / 4);
-    for group in digits.as_bytes().chunks(4) {
-        let mut word = 0_u32;
-        for digit in group {
-            let value = DIGITS.iter().position(|known| known == digit)?;
-            word = word << 6 | value as u32;
-        }
-        word <<= 6 * (4 - group.len());
-        // Bits behind the last byte are zero.
-        let count = group.len() - 1;
-        if word & ((1 << (24 - 8 * count)) - 1) != 0 {
-            return None;
-        }
-        bytes.extend(&word.to_be_bytes()[1..=count]);
-    }
-    Some(bytes)
+    let is_padded = text.ends_with('=');
+    let engine = if is_padded {
+        &BASE64_STANDARD
+    } else {
+        &BASE64_STANDARD_NO_PAD
+    };
+    engine.decode(text).ok()
+}
+
+/// The text of bytes in the alphabet of section 5, without padding.
+pub(crate) fn url(bytes: &[u8]) -> String {
+    BASE64_URL_SAFE_NO_PAD.encode(bytes)
+}
+
+/// The bytes of a text in that alphabet, with or without padding.
+pub(crate) fn of_url(text: &str) -> Option<Vec<u8>> {
+    BASE64_URL_SAFE_NO_PAD.decode(text.trim_end_matches('=')).ok()
 }
 
 #[cfg(test)]

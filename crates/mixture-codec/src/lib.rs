@@ -12,7 +12,6 @@
 //! | the message as numbers in double, single or fixed precision | [`wire::RoundedMixture`] |
 //! | the best message within a number of bits | [`wire::RateControl`] |
 //! | the difference between two densities, estimated at points | [`plug_in`] |
-//! | the same in closed form, and which measure bounds which | [`divergence`] |
 //! | the single steps of a reduction | [`tree`], [`cut`], [`merge`], [`refine`] |
 //!
 //! The reduction has three steps. A tree over the particles is cut to 60 nodes by a bound in closed form. Pairs of nodes are merged, each
@@ -34,14 +33,13 @@
 //!
 //! Not in this crate: the densities themselves (`fewbits-densities`), and which node sends to which (`fewbits-handoff`).
 
-pub mod divergence;
+pub mod plug_in;
 pub mod reduction;
 pub mod tree;
 pub mod wire;
 
-pub use divergence::plug_in;
-pub use divergence::plug_in::{Cubature, PlugIn};
 pub use fewbits_core::Error;
+pub use plug_in::{Cubature, PlugIn};
 pub use reduction::cut::{Criterion, Cut, NodeErrors};
 pub use reduction::merge::MergeCost;
 pub use reduction::{Clump, Clumps, MixtureFit, Reduction, cut, merge, refine};

@@ -2,6 +2,7 @@
 
 use crate::Error;
 use nalgebra::{Vector2, Vector3};
+use std::ops::Deref;
 
 /// A concentration and its gradient with respect to the position of the source.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -108,42 +109,37 @@ pub trait SourceModel {
     }
 }
 
-macro_rules! forward {
-    ($($pointer:ty),*) => {$(
-        impl<M: SourceModel + ?Sized> SourceModel for $pointer {
-            fn receptor(&self, place: &Vector3<f64>) -> Result<Receptor, Error> {
-                (**self).receptor(place)
-            }
+/// References and boxes, as what they point to.
+impl<P: Deref<Target: SourceModel>> SourceModel for P {
+    fn receptor(&self, place: &Vector3<f64>) -> Result<Receptor, Error> {
+        (**self).receptor(place)
+    }
 
-            fn concentration(&self, receptor: &Receptor, source: &Vector3<f64>, age: f64) -> f64 {
-                (**self).concentration(receptor, source, age)
-            }
+    fn concentration(&self, receptor: &Receptor, source: &Vector3<f64>, age: f64) -> f64 {
+        (**self).concentration(receptor, source, age)
+    }
 
-            fn concentrations(&self, receptor: &Receptor, source: &Vector3<f64>, ages: &[f64], out: &mut [f64]) {
-                (**self).concentrations(receptor, source, ages, out);
-            }
+    fn concentrations(&self, receptor: &Receptor, source: &Vector3<f64>, ages: &[f64], out: &mut [f64]) {
+        (**self).concentrations(receptor, source, ages, out);
+    }
 
-            fn source_gradient(&self, receptor: &Receptor, source: &Vector3<f64>, age: f64) -> SourceGradient {
-                (**self).source_gradient(receptor, source, age)
-            }
+    fn source_gradient(&self, receptor: &Receptor, source: &Vector3<f64>, age: f64) -> SourceGradient {
+        (**self).source_gradient(receptor, source, age)
+    }
 
-            fn variation(&self, receptor: &Receptor, source: &Vector3<f64>, half_width: f64, age: f64) -> f64 {
-                (**self).variation(receptor, source, half_width, age)
-            }
+    fn variation(&self, receptor: &Receptor, source: &Vector3<f64>, half_width: f64, age: f64) -> f64 {
+        (**self).variation(receptor, source, half_width, age)
+    }
 
-            fn admits(&self, source: &Vector3<f64>, half_width: f64) -> bool {
-                (**self).admits(source, half_width)
-            }
+    fn admits(&self, source: &Vector3<f64>, half_width: f64) -> bool {
+        (**self).admits(source, half_width)
+    }
 
-            fn homogeneous(&self) -> Option<Homogeneous> {
-                (**self).homogeneous()
-            }
+    fn homogeneous(&self) -> Option<Homogeneous> {
+        (**self).homogeneous()
+    }
 
-            fn diffusivity_slope(&self, receptor: &Receptor, source: &Vector3<f64>, age: f64) -> Option<f64> {
-                (**self).diffusivity_slope(receptor, source, age)
-            }
-        }
-    )*};
+    fn diffusivity_slope(&self, receptor: &Receptor, source: &Vector3<f64>, age: f64) -> Option<f64> {
+        (**self).diffusivity_slope(receptor, source, age)
+    }
 }
-
-forward!(&M, Box<M>, std::sync::Arc<M>);

@@ -1,11 +1,36 @@
 //! The four measures between discrete distributions, and the inequalities between them that the paper prints, corrects or needs.
 
 use fewbits_core::{Error, Gaussian};
-use fewbits_mixture_codec::divergence::Divergence;
+use fewbits_mixture_codec::PlugIn;
 use fewbits_numerics::eigen::symmetric_eigen;
 use fewbits_numerics::error::{entries, probabilities};
 use fewbits_numerics::factored::Factored;
 use nalgebra::SMatrix;
+
+/// The four measures between two known distributions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Divergence {
+    /// Kullback-Leibler divergence in nats; infinite if `q` is zero where `p` is not.
+    pub kl: f64,
+    /// Integral (sum) of the absolute difference, at most 2.
+    pub l1: f64,
+    /// Largest absolute log ratio.
+    pub ml: f64,
+    /// Half the range of the log ratio.
+    pub dr: f64,
+}
+
+/// Uses the estimates as if they were the measures themselves; a KL below zero is replaced by zero.
+impl From<PlugIn> for Divergence {
+    fn from(estimate: PlugIn) -> Self {
+        Self {
+            kl: estimate.kl_plugin.max(0.0),
+            l1: estimate.l1_plugin,
+            ml: estimate.ml_plugin,
+            dr: estimate.dr_plugin,
+        }
+    }
+}
 
 /// The four measures between two discrete distributions on the same points. Points at which both are zero are left out.
 ///

@@ -6,7 +6,7 @@ pub mod quadrature;
 
 use fewbits_densities::KernelEstimate;
 use fewbits_mixture_codec::Error;
-use fewbits_mixture_codec::divergence::plug_in::node_errors;
+use fewbits_mixture_codec::plug_in::node_errors;
 use fewbits_mixture_codec::reduction::cut::{Criterion, NodeErrors};
 use fewbits_mixture_codec::tree::{Split, Tree};
 

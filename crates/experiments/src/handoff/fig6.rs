@@ -4,7 +4,7 @@ use super::filters::{CRITERIA, PARTICLES, STEPS, Smoothing, estimate, median, pa
 use super::world::Walk;
 use crate::prelude::*;
 use fewbits_baselines::handoff::{Amplification, Bounds, bounds};
-use fewbits_mixture_codec::divergence::Divergence;
+use fewbits_baselines::mixture_codec::divergence::Divergence;
 use fewbits_mixture_codec::plug_in::plug_in;
 use std::f64::consts::LN_10;
 

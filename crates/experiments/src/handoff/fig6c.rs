@@ -5,9 +5,9 @@ use super::filters::{
 };
 use super::world::Walk;
 use crate::prelude::*;
+use fewbits_baselines::mixture_codec::divergence::Divergence;
 use fewbits_core::Columns;
 use fewbits_densities::{KernelEstimate, Mixture, Particles};
-use fewbits_mixture_codec::divergence::Divergence;
 use fewbits_mixture_codec::plug_in::plug_in;
 
 parameters! {

@@ -1,6 +1,6 @@
 //! Cuts of a tree: a choice of nodes whose Gaussians replace the estimate, found greedily or by dynamic programming.
 
-use crate::divergence::plug_in::{PlugIn, node_errors};
+use crate::plug_in::{PlugIn, node_errors};
 use crate::tree::ROOT;
 use crate::{Error, Tree};
 use fewbits_densities::{KernelEstimate, Mixture};

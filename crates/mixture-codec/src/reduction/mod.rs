@@ -12,7 +12,7 @@ pub use mixture_fit::MixtureFit;
 pub use refine::refine;
 
 use crate::Error;
-use crate::divergence::plug_in::Cubature;
+use crate::plug_in::Cubature;
 use crate::tree::{Split, Tree};
 use cut::{Criterion, NodeErrors, greedy, optimal};
 use fewbits_densities::{Component, KernelEstimate, Mixture};

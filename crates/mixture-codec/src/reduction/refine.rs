@@ -1,7 +1,7 @@
 //! Expectation-maximisation that fits a mixture to a kernel estimate, with a lower limit of the covariances.
 
 use crate::Error;
-use crate::divergence::plug_in::Cubature;
+use crate::plug_in::Cubature;
 use crate::reduction::em::{Limits, Points, step};
 use fewbits_densities::{Component, KernelEstimate, Mixture};
 use fewbits_numerics::linalg::symmetrised;

@@ -1,7 +1,7 @@
 //! Rate control: the best mixture within a given number of bits.
 
 use super::{CodedMixture, WireFormat};
-use crate::divergence::plug_in::{Cubature, CubatureTarget};
+use crate::plug_in::{Cubature, CubatureTarget};
 use crate::{Error, Reduction};
 use fewbits_core::Message;
 use fewbits_densities::KernelEstimate;

@@ -2,7 +2,7 @@
 
 use fewbits_core::{BitString, Message};
 use fewbits_densities::{Bandwidth, Component, KernelEstimate, Mixture, Particles};
-use fewbits_mixture_codec::divergence::plug_in;
+use fewbits_mixture_codec::plug_in;
 use fewbits_mixture_codec::wire::{CodedMixture, WireFormat};
 use fewbits_mixture_codec::{Criterion, MergeCost, Reduction, Split, merge};
 use fewbits_numerics::wild;

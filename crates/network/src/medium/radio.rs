@@ -106,27 +106,13 @@ impl Radio {
             .find(|(dbm, _)| *dbm == output_dbm)
             .map(|(_, milliwatts)| *milliwatts)
             .ok_or_else(|| ArgumentError::new("output_dbm", output_dbm, "0, -1, -3, -5, -7, -10, -15 or -25"))?;
-        let receive = Watts::trusted(62e-3);
         Ok(Self {
-            bit_rate: 250e3,
-            transceiver: Transceiver::Powers {
-                transmit: Watts::trusted(milliwatts * 1e-3),
-                receive,
-            },
             // 20 uA in power-down mode.
             sleep: Watts::trusted(0.066e-3),
             baseline: Watts::trusted(6e-3),
-            active: receive,
-            turnaround: Seconds::trusted(0.192e-3),
             wake: Seconds::trusted(0.194e-3),
             doze: Seconds::trusted(0.05e-3),
-            guard: Seconds::ZERO,
-            preamble: Bits(48),
-            header: Bits(72),
-            acknowledgement: Bits(88),
-            mtu: Some(Bits(127 * 8)),
-            battery: Some(TWO_AA_CELLS),
-            lora: None,
+            ..Self::of_powers(milliwatts * 1e-3, 62e-3)
         })
     }
 
@@ -138,26 +124,20 @@ impl Radio {
     /// If `spreading` is not 7 to 12.
     pub fn lorawan(spreading: u32) -> Result<Self, ArgumentError> {
         let lora = Lora::new(spreading, 125e3)?;
-        // 28 mA, 10.3 mA and 0.2 uA.
-        let (transmit, receive) = (Watts::trusted(92.4e-3), Watts::trusted(34e-3));
         Ok(Self {
             // Of the modulation; frames take the time of the formula.
             bit_rate: f64::from(spreading) / lora.symbol().value() * 0.8,
-            transceiver: Transceiver::Powers { transmit, receive },
             sleep: Watts::trusted(0.66e-6),
-            baseline: Watts::ZERO,
-            active: receive,
             turnaround: Seconds::trusted(1.0),
             wake: Seconds::trusted(0.25e-3),
-            doze: Seconds::ZERO,
-            guard: Seconds::ZERO,
             preamble: Bits(0),
             header: LORAWAN_OVERHEAD,
             // A frame without payload has no port.
             acknowledgement: Bits(LORAWAN_OVERHEAD.0 - 8),
             mtu: Some(LORAWAN_OVERHEAD + lora.max_payload()),
-            battery: Some(TWO_AA_CELLS),
             lora: Some(lora),
+            // 28 mA, 10.3 mA and, asleep, 0.2 uA.
+            ..Self::of_powers(92.4e-3, 34e-3)
         })
     }
 
@@ -165,18 +145,12 @@ impl Radio {
     /// mA, and 100 mA while it receives). Frames are datagrams over UDP. The radio stays in light sleep (0.8 mA) between frames and keeps
     /// its connection. The access point's beacons, which it must hear to keep it, are not counted. Currents are as others quote them.
     pub fn esp32_wifi() -> Self {
-        let (transmit, receive) = (Watts::trusted(792e-3), Watts::trusted(330e-3));
         Self {
             bit_rate: 1e6,
-            transceiver: Transceiver::Powers { transmit, receive },
             sleep: Watts::trusted(2.64e-3),
-            baseline: Watts::ZERO,
-            active: receive,
             // Short interframe space.
             turnaround: Seconds::trusted(10e-6),
             wake: Seconds::trusted(1e-3),
-            doze: Seconds::ZERO,
-            guard: Seconds::ZERO,
             // Long preamble and header of the physical layer, 192 us.
             preamble: Bits(192),
             // 26 bytes of the link, 8 of LLC and SNAP, 20 of IPv4, 8 of UDP, and the check of 4.
@@ -185,8 +159,7 @@ impl Radio {
             acknowledgement: Bits(192 + 112),
             // A datagram of 1500 bytes.
             mtu: Some(Bits(1538 * 8)),
-            battery: Some(TWO_AA_CELLS),
-            lora: None,
+            ..Self::of_powers(792e-3, 330e-3)
         }
     }
 
@@ -194,15 +167,25 @@ impl Radio {
     /// included, as the specification states them for 250 kbit/s. Asleep it draws 1.5 uA with its clock running, and its wake-up is that of the crystal
     /// (0.36 ms) and the ramp of the radio (0.04 ms): these are the specification's as others quote it.
     pub fn nrf52840() -> Self {
-        let (transmit, receive) = (Watts::trusted(19.2e-3), Watts::trusted(19.59e-3));
+        Self {
+            sleep: Watts::trusted(4.5e-6),
+            wake: Seconds::trusted(0.4e-3),
+            ..Self::of_powers(19.2e-3, 19.59e-3)
+        }
+    }
+
+    /// A radio that takes these powers, in watts, to send and to receive, on two AA cells; it sleeps and wakes for nothing. Frames and bit rate
+    /// are those of IEEE 802.15.4 at 2.4 GHz.
+    fn of_powers(transmit: f64, receive: f64) -> Self {
+        let (transmit, receive) = (Watts::trusted(transmit), Watts::trusted(receive));
         Self {
             bit_rate: 250e3,
             transceiver: Transceiver::Powers { transmit, receive },
-            sleep: Watts::trusted(4.5e-6),
+            sleep: Watts::ZERO,
             baseline: Watts::ZERO,
             active: receive,
             turnaround: Seconds::trusted(0.192e-3),
-            wake: Seconds::trusted(0.4e-3),
+            wake: Seconds::ZERO,
             doze: Seconds::ZERO,
             guard: Seconds::ZERO,
             preamble: Bits(48),

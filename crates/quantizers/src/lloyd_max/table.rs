@@ -28,21 +28,14 @@ struct Table {
 impl TryFrom<Table> for LloydMax {
     type Error = Error;
 
-    fn try_from(
-        Table {
-            breakpoints,
-            centroids,
-            probabilities,
-            mean_squared_error,
-        }: Table,
-    ) -> Result<Self, Error> {
-        LloydMax {
-            breakpoints,
-            centroids,
-            probabilities,
-            mean_squared_error,
-        }
-        .checked()
+    fn try_from(table: Table) -> Result<Self, Error> {
+        let design = LloydMax {
+            breakpoints: table.breakpoints,
+            centroids: table.centroids,
+            probabilities: table.probabilities,
+            mean_squared_error: table.mean_squared_error,
+        };
+        design.checked()
     }
 }
 

@@ -80,6 +80,10 @@ fn any_bytes_are_read_or_refused() {
         }
     }
     assert!(from_cbor(&[0x9f; 100_000], NOW).is_err());
+    // Lengths far beyond the bytes that follow: bytes, text, a list, fields.
+    for kind in [0x5b, 0x7b, 0x9b, 0xbb] {
+        assert!(from_cbor(&[kind, 0x7f, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff], NOW).is_err());
+    }
     // Half and single precision, indefinite lengths: 1.5 each.
     let short = [
         0x9f, 0xbf, 0, 0x61, b'a', 2, 0xf9, 0x3e, 0, 0xff, 0xa2, 0, 0x61, b'b', 2, 0xfa, 0x3f, 0xc0, 0, 0, 0xff,
