@@ -175,3 +175,61 @@ impl<'a> Grid<'a> {
         found.into_iter().flat_map(beside).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ranges::RangeSettings;
+    use nalgebra::{DMatrix, DVector, Vector3};
+
+    /// The density is that of ranges with a common covariance: noise, and what bias and scale do to all of them.
+    #[test]
+    fn values_are_the_density_of_ranges_with_bias_and_scale() {
+        let places =
+            [[0.0, 0.0], [9.0, 1.0], [8.0, 7.0], [-1.0, 6.0], [4.0, 9.0]].map(|[x, y]| Vector3::new(x, y, 0.0));
+        let known = RangeSettings::default().known(&places).unwrap();
+        let calibration = [(0.3, 1.7), (-0.02, 0.01)];
+        let search = Search {
+            known: &known,
+            calibration,
+            anchors: places.len(),
+        };
+        let collected = |(anchor, place): (usize, &Vector3<f64>)| Collected {
+            anchor,
+            place: [place.x, place.y, place.z],
+            range: 4.0 + (place - Vector3::new(3.0, 4.0, 0.0)).norm() + 0.1 * anchor as f64,
+            age: 0.0,
+            share: 1.0,
+            slope: 1.0,
+        };
+        let ranges: Vec<Collected> = places.iter().enumerate().map(collected).collect();
+        let grid = Grid::new(&search, &ranges);
+        for without in [None, Some(0), Some(3)] {
+            let used: Vec<&Collected> = (0..ranges.len())
+                .filter(|i| Some(*i) != without)
+                .map(|i| &ranges[i])
+                .collect();
+            let density = |point: usize| {
+                let far = DVector::from_iterator(
+                    used.len(),
+                    used.iter().map(|one| search.measured(&grid.points[point], one)),
+                );
+                let [(bias, of_bias), (scale, of_scale)] = calibration;
+                let off = DVector::from_fn(used.len(), |i, _| used[i].range - bias - (1.0 + scale) * far[i]);
+                let covariance = of_scale * &far * far.transpose()
+                    + DMatrix::from_element(used.len(), used.len(), of_bias)
+                    + DMatrix::identity(used.len(), used.len()) * grid.variance;
+                let root = covariance.cholesky().unwrap();
+                -grid.priors[point] - 0.5 * (off.dot(&root.solve(&off)) + root.determinant().ln())
+            };
+            let values = grid.values(&calibration, without);
+            // Up to a constant of all points.
+            let points = [0, 17, 312, 400, 624];
+            let constant = values[312] - density(312);
+            for point in points {
+                let error = values[point] - density(point) - constant;
+                assert!(error.abs() < 1e-8 * (1.0 + values[point].abs()), "{without:?}, {point}: {error}");
+            }
+        }
+    }
+}

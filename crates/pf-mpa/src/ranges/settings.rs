@@ -39,6 +39,8 @@ const STATED: f64 = 4.0;
 /// Weight below which a filter is left out. A level says less than a range in full, so of levels more filters stay probable.
 const NEGLIGIBLE: f64 = 1e-4;
 pub(super) const NEGLIGIBLE_OF_LEVELS: f64 = 5e-5;
+/// A filter of more weight in its hypothesis is kept, however improbable the hypothesis is.
+const LEAST_WEIGHT: f64 = 3e-3;
 /// Deviation by which the bias changes in a second, as a share of its own.
 const DRIFT: f64 = 0.002;
 
@@ -206,6 +208,11 @@ pub(super) struct Known {
 }
 
 impl Known {
+    /// The weight below which a filter of a hypothesis of this probability is left out: the less it is, the fewer filters are kept.
+    pub(super) fn least_weight(&self, share: f64) -> f64 {
+        (self.negligible / share).clamp(self.negligible, LEAST_WEIGHT)
+    }
+
     /// Leaves out that the target rests.
     pub(super) fn leave_rest_out(&mut self) {
         if self.has_rest {
