@@ -27,6 +27,9 @@ pub(super) struct Summary {
     pub(super) zero: u64,
     pub(super) losses: usize,
     pub(super) anchors: Vec<AnchorSummary>,
+    /// Standard deviation of the biases of single anchors that walk, and the seconds after which one is forgotten.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) walking_biases: Option<(f64, f64)>,
     /// What the ranges suggest that no option says.
     pub(super) hints: Vec<String>,
     /// The mistake of the tables that explains the ranges.
@@ -111,6 +114,17 @@ pub(super) fn lines(summary: &Summary, tracker: &RangeTracker, settings: RangeSe
                 anchor.name
             ));
         }
+    }
+    if let Some((deviation, seconds)) = summary.walking_biases.filter(|_| !is_height) {
+        let size = if settings.proportional {
+            format!("{} %", short(100.0 * deviation))
+        } else {
+            short(deviation)
+        };
+        lines.push(format!(
+            "biases of single anchors change, by about {size} within {} s, and the bands allow for it: clocks drift, something comes and goes before anchors, or one stands elsewhere than its table says",
+            short(seconds)
+        ));
     }
     let lasting: Vec<(&str, f64)> = summary
         .anchors

@@ -125,6 +125,7 @@ pub(super) fn run(
         losses: 0,
         hints: Vec::new(),
         mistake: None,
+        walking_biases: None,
         anchors: anchors
             .iter()
             .map(|(name, _)| AnchorSummary {
@@ -236,6 +237,7 @@ pub(super) fn run(
         output.take().map_or(Ok(()), Sheet::finish)?;
     }
     (summary.bits, summary.losses) = (tracker.bits(), tracker.losses());
+    summary.walking_biases = tracker.walking_biases();
     summary.bits_per_range = summary.bits as f64 / (summary.ranges as f64).max(1.0);
     for anchor in &mut summary.anchors {
         let (name, refused) = (&anchor.name, Error::refused("an anchor is refused"));
@@ -285,8 +287,10 @@ pub(super) fn run(
     // A level says little: chance alone contradicts for a while.
     let least = if travel == Travel::Full { 0.5 } else { SURELY };
     let is_wrong = |one: &AnchorSummary| one.works < least || one.own_bias.is_some() || one.lasting.is_some();
-    let is_suspect =
-        summary.losses > 0 || OFTEN * summary.doubtful > summary.rows || summary.anchors.iter().any(is_wrong);
+    let is_suspect = summary.losses > 0
+        || OFTEN * summary.doubtful > summary.rows
+        || summary.anchors.iter().any(is_wrong)
+        || summary.walking_biases.is_some();
     if is_suspect {
         summary.mistake = mistake(anchors, settings, &first);
         summary.hints.extend(summary.mistake.as_ref().and_then(mended));
