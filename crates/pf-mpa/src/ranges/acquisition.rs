@@ -24,10 +24,9 @@ use super::settings::Known;
 /// Sets and places that become hypotheses at most, and by how many nats they may be worse than the best.
 const KEPT: usize = 6;
 const WORSE: f64 = 9.2;
-/// Of pieces and slices those that are not needed: the share of their probabilities.
-const NEGLIGIBLE: f64 = 3e-3;
-/// By how many nats a place with a bias of an anchor's own may be worse than the best place, at the noise that explains the place best.
-const IMPROBABLE: f64 = 8.0;
+/// Shares of a place with a bias of an anchor's own and of the best place, at the noise that explains the place best: one that is less than this part of
+/// the share that pieces may lack is left out.
+const IMPROBABLE: f64 = 0.1;
 /// Slices of a place, and of a place of a piece, in its length's deviation.
 const SLICES: f64 = 4.0;
 const SLICES_OF_A_PIECE: f64 = 2.0;
@@ -149,7 +148,7 @@ pub(super) fn hypotheses(
     let total: f64 = weights.iter().sum();
     let mut rest = total;
     let counts = weights.iter().take_while(|weight| {
-        let is_needed = rest > NEGLIGIBLE * total;
+        let is_needed = rest > known.needless * total;
         rest -= *weight;
         is_needed
     });
@@ -172,7 +171,7 @@ pub(super) fn hypotheses(
                 (&some[..], one.without)
             };
             let log_prior = penalty(without) + probability.ln() + log_share;
-            let is_probable = |log_evidence: f64| log_evidence + log_prior > best - IMPROBABLE;
+            let is_probable = |log_evidence: f64| log_evidence + log_prior > best + (IMPROBABLE * known.needless).ln();
             if is_apart && !search.evidence(one, ranges, *own).is_some_and(is_probable) {
                 continue;
             }
@@ -191,13 +190,7 @@ pub(super) fn hypotheses(
     made.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
     let highest = made.first().map_or(0.0, |one| one.log_weight);
     let total: f64 = made.iter().map(|one| (one.log_weight - highest).exp()).sum();
-    // One of which an anchor is apart may be improbable for long: it is kept by its own weight.
-    let mut rest = total;
-    made.retain(|one| {
-        let is_needed = rest > NEGLIGIBLE * total || known.anchor_biases[one.variant].0.only().is_some();
-        rest -= (one.log_weight - highest).exp();
-        is_needed && is_worth(one.log_weight - highest, known.negligible)
-    });
+    made.retain(|one| is_worth(one.log_weight - highest, known.negligible));
     let mut all = Vec::with_capacity(made.len());
     for made in made {
         let (own, _) = known.anchor_biases[made.variant];

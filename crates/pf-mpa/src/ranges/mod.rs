@@ -65,7 +65,7 @@ use nalgebra::Vector3;
 use odds::{ASIDE, count_contradictions, drop_improbable, is_lost, merge_same, shares_of, uncertainty_of_noise, weigh};
 use residuals::Residuals;
 use rows::Latest;
-use settings::{Known, NEGLIGIBLE_OF_LEVELS};
+use settings::{Known, NEEDLESS_OF_LEVELS, NEGLIGIBLE_OF_LEVELS};
 use std::collections::BTreeMap;
 use step::Step;
 use walking::with_walks;
@@ -144,7 +144,7 @@ impl RangeTracker {
         let places: Vec<Vector3<f64>> = anchors.values().copied().collect();
         let mut known = settings.known(&places)?;
         if travel != Travel::Full {
-            known.negligible = NEGLIGIBLE_OF_LEVELS;
+            (known.negligible, known.needless) = (NEGLIGIBLE_OF_LEVELS, NEEDLESS_OF_LEVELS);
             known.anchor_biases.retain(|(own, _)| own.only().is_none());
         }
         Ok(Self {
