@@ -16,17 +16,17 @@ use super::bank::Hypothesis;
 use super::fit::{Calibration, Search};
 use super::gaussian::Normal;
 use super::grid::Grid;
+use super::odds::is_worth;
 use super::rows::Collected;
-use super::search::Found;
+use super::search::{Bank, Found};
 use super::settings::Known;
 
 /// Sets and places that become hypotheses at most, and by how many nats they may be worse than the best.
 const KEPT: usize = 6;
 const WORSE: f64 = 9.2;
-/// Of pieces and slices those that are not needed: the share of their probabilities.
-const NEGLIGIBLE: f64 = 1e-3;
-/// By how many nats a place with a bias of an anchor's own may be worse than the best place, at the noise that explains the place best.
-const IMPROBABLE: f64 = 9.2;
+/// Shares of a place with a bias of an anchor's own and of the best place, at the noise that explains the place best: one that is less than this part of
+/// the share that pieces may lack is left out.
+const IMPROBABLE: f64 = 0.1;
 /// Slices of a place, and of a place of a piece, in its length's deviation.
 const SLICES: f64 = 4.0;
 const SLICES_OF_A_PIECE: f64 = 2.0;
@@ -148,47 +148,83 @@ pub(super) fn hypotheses(
     let total: f64 = weights.iter().sum();
     let mut rest = total;
     let counts = weights.iter().take_while(|weight| {
-        let is_needed = rest > NEGLIGIBLE * total;
+        let is_needed = rest > known.needless * total;
         rest -= *weight;
         is_needed
     });
     let kept = counts.count();
     parts.truncate(kept);
-    let mut all = Vec::new();
+    let mut made: Vec<Made<'_>> = Vec::new();
     let all_good = vec![GOOD; anchors];
     for (search, one, log_share) in &parts {
-        let ranges = left(one.without);
         let out = one.without.map(|i| collected[i].anchor);
-        let good: Vec<f64> = (0..anchors)
-            .map(|anchor| if out == Some(anchor) { GOOD_AFTER_OUTLIER } else { GOOD })
-            .collect();
+        let some = left(one.without);
         for (variant, (own, probability)) in known.anchor_biases.iter().enumerate() {
             // A bias of an anchor's own is an explanation of its range: it is taken in at a place that the others explain.
             let is_apart = own.only().is_some();
             if is_apart && out.is_some() && out != own.only() {
                 continue;
             }
-            let (ranges, good, without) = if is_apart {
-                (collected, &all_good, None)
+            let (ranges, without) = if is_apart {
+                (collected, None)
             } else {
-                (&ranges[..], &good, one.without)
+                (&some[..], one.without)
             };
             let log_prior = penalty(without) + probability.ln() + log_share;
-            let is_probable = |log_evidence: f64| log_evidence + log_prior > best - IMPROBABLE;
+            let is_probable = |log_evidence: f64| log_evidence + log_prior > best + (IMPROBABLE * known.needless).ln();
             if is_apart && !search.evidence(one, ranges, *own).is_some_and(is_probable) {
                 continue;
             }
-            let Some((filters, weights, log_evidence)) = search.bank(one, ranges, *own) else {
-                continue;
-            };
-            let mut hypothesis = Hypothesis::new(log_evidence + log_prior, filters, weights, good.clone(), variant);
-            hypothesis.is_cut = is_short(ranges.len() - usize::from(is_apart));
+            if let Some(bank) = search.bank(one, ranges, *own) {
+                made.push(Made {
+                    log_weight: bank.log_evidence + log_prior,
+                    search,
+                    one,
+                    without,
+                    variant,
+                    bank,
+                });
+            }
+        }
+    }
+    made.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
+    let highest = made.first().map_or(0.0, |one| one.log_weight);
+    let total: f64 = made.iter().map(|one| (one.log_weight - highest).exp()).sum();
+    made.retain(|one| is_worth(one.log_weight - highest, known.negligible));
+    let mut all = Vec::with_capacity(made.len());
+    for made in made {
+        let (own, _) = known.anchor_biases[made.variant];
+        let out = made.without.map(|i| collected[i].anchor);
+        let mut good = all_good.clone();
+        out.into_iter().for_each(|out| good[out] = GOOD_AFTER_OUTLIER);
+        let some = left(made.without);
+        // One of which an anchor is apart may be improbable for long, and then needs all of its filters.
+        let is_apart = own.only().is_some();
+        let share = if is_apart {
+            1.0
+        } else {
+            (made.log_weight - highest).exp() / total
+        };
+        let least = known.least_weight(share);
+        let (filters, weights) = made.search.laws(&made.bank, made.one, &some, own, least);
+        if weights.iter().all(|weight| weight.is_finite()) {
+            let mut hypothesis = Hypothesis::new(made.log_weight, filters, weights, good, made.variant);
+            hypothesis.is_cut = is_short(some.len() - usize::from(is_apart));
             hypothesis.apart = own.only();
             all.push(hypothesis);
         }
     }
-    all.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
     all
+}
+
+/// A hypothesis before the laws of its filters are built.
+struct Made<'a> {
+    log_weight: f64,
+    search: &'a Search<'a>,
+    one: &'a Found,
+    without: Option<usize>,
+    variant: usize,
+    bank: Bank,
 }
 
 /// A place cut by the error of scale: what each piece is searched with, the places, and `ln` of the piece's share. A curve may have two places

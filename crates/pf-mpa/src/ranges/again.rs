@@ -1,6 +1,9 @@
-//! The start of another acquisition.
+//! Acquisition, and the start of another one.
 
-use super::odds::calibration_of;
+use super::acquisition::hypotheses;
+use super::odds::{calibration_of, drop_improbable};
+use super::residuals::Residuals;
+use super::rows::Collected;
 use super::{RangeTracker, Travel};
 use nalgebra::Vector3;
 
@@ -44,5 +47,21 @@ impl RangeTracker {
         if self.travel != Travel::Full {
             self.collected.clear();
         }
+    }
+
+    /// Looks for places that explain the latest range of each anchor.
+    pub(super) fn acquire(&mut self, time: f64) {
+        let rows: Vec<Collected> = self
+            .collected
+            .iter()
+            .map(|(anchor, latest)| latest.seen_at(time, *anchor, &self.places[*anchor], self.known.measured))
+            .collect();
+        self.residuals.iter_mut().for_each(Residuals::interrupt);
+        self.hypotheses = hypotheses(&self.known, self.places.len(), self.calibration, &rows);
+        self.tried = 0;
+        let mut found = std::mem::take(&mut self.hypotheses);
+        self.evidence = drop_improbable(&mut found, self.known.negligible);
+        self.hypotheses = found;
+        self.at = time;
     }
 }

@@ -73,6 +73,29 @@ impl RangeTracker {
         Ok((probability > 0.5 && bias * bias > APPARENT * APPARENT * (square - bias * bias)).then_some(bias))
     }
 
+    /// The same tracker, to which biases of anchors are constant: trackers that are compared on the same ranges explain them by what they suppose.
+    pub(super) fn rigid(mut self) -> Self {
+        self.has_walks = false;
+        self
+    }
+
+    /// How the biases of single anchors walk, if it is more probable than not that they do: their standard deviation beside the common bias, and
+    /// the seconds after which one is forgotten. Then errors last from range to range, as those of drifting clocks or behind people, or the table of
+    /// anchors is wrong. The bands allow for it.
+    pub fn walking_biases(&self) -> Option<(f64, f64)> {
+        let mut found = None;
+        let mut probability = 0.0;
+        let mut most = 0.0;
+        for (one, share) in self.hypotheses.iter().zip(shares_of(&self.hypotheses)) {
+            let Some(walk) = one.walk else { continue };
+            probability += share;
+            if share > most {
+                (most, found) = (share, Some((walk.deviation, walk.seconds)));
+            }
+        }
+        found.filter(|_| probability > 0.5)
+    }
+
     /// The mean product of successive residuals of an anchor, each in its predicted deviation, if it is far above the zero of a right geometry:
     /// the anchor does not stand where it is said to, or ranges have errors that last, and the bands are too narrow. Far is .25, and
     /// six standard deviations of the mean of independent ones. `None` otherwise, and for fewer than 40 ranges in full since places were found.

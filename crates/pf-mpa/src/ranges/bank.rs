@@ -5,6 +5,7 @@ use super::gaussian::{Normal, Predicted, merge_into};
 use super::rest::Rest;
 use super::settings::Known;
 use super::step::Step;
+use super::walk::Walk;
 use crate::Error;
 
 /// Probability per range that the speed changes: once in a few minutes. The noise is a property of the radio and changes less often.
@@ -16,8 +17,7 @@ const MIXED: u32 = 5;
 pub(super) const ANCHOR_CHANGES: f64 = 1e-3;
 /// Share of a range's score that stays in the sum of an anchor's scores.
 const SCORE_KEPT: f64 = 0.9;
-/// A filter of more weight in its hypothesis is kept, however improbable the hypothesis is.
-const LEAST_WEIGHT: f64 = 3e-3;
+
 /// One explanation of all ranges so far.
 #[derive(Debug)]
 pub(super) struct Hypothesis {
@@ -35,6 +35,8 @@ pub(super) struct Hypothesis {
     /// Which supposition of single anchors' biases it has, and the anchor that alone has one.
     pub(super) variant: usize,
     pub(super) apart: Option<usize>,
+    /// How the biases of single anchors walk, if they do.
+    pub(super) walk: Option<Walk>,
     /// Probability that a range is no outlier, averaged over the latest ranges.
     pub(super) agreement: f64,
     /// Ranges in a row for which the anchors that are left did not determine the position.
@@ -87,6 +89,7 @@ impl Clone for Hypothesis {
             good: self.good.clone(),
             variant: self.variant,
             apart: self.apart,
+            walk: self.walk,
             is_cut: self.is_cut,
             agreement: self.agreement,
             contradicted: self.contradicted,
@@ -107,7 +110,7 @@ impl Clone for Hypothesis {
         self.weights.clone_from(&from.weights);
         self.alive.clone_from(&from.alive);
         self.good.clone_from(&from.good);
-        (self.variant, self.apart) = (from.variant, from.apart);
+        (self.variant, self.apart, self.walk) = (from.variant, from.apart, from.walk);
         self.is_cut = from.is_cut;
         self.agreement = from.agreement;
         self.contradicted = from.contradicted;
@@ -138,6 +141,7 @@ impl Hypothesis {
             good,
             variant,
             apart: None,
+            walk: None,
             is_cut: false,
             agreement: 1.0,
             contradicted: 0,
@@ -165,7 +169,7 @@ impl Hypothesis {
     pub(super) fn predict(&mut self, known: &Known, step: &Step, share: f64) {
         // An anchor that is apart is improbable for long, and then needs the filters that were right all the time.
         let share = if self.apart.is_none() { share } else { 1.0 };
-        self.negligible = (known.negligible / share).clamp(known.negligible, LEAST_WEIGHT);
+        self.negligible = known.least_weight(share);
         let (speeds, noises) = (known.speeds.len(), known.noises.len());
         self.ranges += 1;
         if self.ranges.is_multiple_of(MIXED) {
@@ -192,6 +196,9 @@ impl Hypothesis {
         for i in &self.alive {
             let (filter, speed) = (&mut self.filters[*i], known.speeds[i / noises]);
             filter.predict(step, speed * speed);
+            if let Some(walk) = &self.walk {
+                walk.carry(filter, step);
+            }
             let positions = filter.mean.iter_mut().take(known.axes);
             positions.zip(by).for_each(|(x, by)| *x += by);
         }

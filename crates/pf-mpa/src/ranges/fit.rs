@@ -82,9 +82,26 @@ struct Problem<'a, const S: usize> {
     prior: Vector<S>,
 }
 
-impl<const S: usize> Problem<'_, S> {
+impl<'a, const S: usize> Problem<'a, S> {
     /// Number of positions.
     const AXES: usize = S - 2;
+
+    fn new(search: &'a Search<'a>, rows: &'a Rows<'a>) -> Self {
+        let axes = Self::AXES;
+        let (mut middle, mut prior) = ([0.0; S], [0.0; S]);
+        for i in 0..axes {
+            (middle[i], prior[i]) = (search.known.middle[i], search.known.spreads[i].powi(2));
+        }
+        for (i, (mean, variance)) in search.calibration.into_iter().enumerate() {
+            (middle[axes + i], prior[axes + i]) = (mean, variance);
+        }
+        Self {
+            search,
+            rows,
+            middle,
+            prior,
+        }
+    }
 
     /// The expected range and its gradient.
     #[inline]
@@ -184,40 +201,66 @@ fn inverse<const S: usize>(root: &Matrix<S>) -> Matrix<S> {
     found
 }
 
-/// The most probable state near a start, which is a place or a whole state, its covariance there, and the evidence, in a slice of the positions if
-/// there is one. `None` if the information is singular.
-pub(super) fn fit(search: &Search<'_>, start: &[f64], rows: &Rows<'_>, speed: f64, own: Own) -> Option<(Normal, f64)> {
-    if search.axes() == 2 {
-        fit_of::<4>(search, start, rows, speed, own)
-    } else {
-        fit_of::<5>(search, start, rows, speed, own)
+/// Coordinates of a peak at most.
+const MOST: usize = 5;
+
+/// The most probable state of some ranges, and its evidence. The law about it is built where it is needed.
+#[derive(Clone, Copy)]
+pub(super) struct Peak {
+    x: [f64; MOST],
+    /// The lower triangular root of the information there.
+    root: Matrix<MOST>,
+    pub(super) log_evidence: f64,
+}
+
+impl Peak {
+    /// Positions, bias and scale: a start of another fit.
+    pub(super) fn start(&self, axes: usize) -> &[f64] {
+        &self.x[..axes + 2]
+    }
+
+    /// Whether it is a copy.
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        self.log_evidence == other.log_evidence && self.x == other.x
+    }
+
+    /// The law of the whole state. `None` if it is not finite.
+    pub(super) fn law(&self, search: &Search<'_>, rows: &Rows<'_>, speed: f64, own: Own) -> Option<Normal> {
+        if search.axes() == 2 {
+            self.law_of::<4>(search, rows, speed, own)
+        } else {
+            self.law_of::<MOST>(search, rows, speed, own)
+        }
+    }
+
+    fn law_of<const S: usize>(&self, search: &Search<'_>, rows: &Rows<'_>, speed: f64, own: Own) -> Option<Normal> {
+        let (x, factor) = (
+            std::array::from_fn(|i| self.x[i]),
+            std::array::from_fn(|i| std::array::from_fn(|j| self.root[i][j])),
+        );
+        let found = law::<S>(&Problem::new(search, rows), &x, &factor, speed, own);
+        found.is_finite().then_some(found)
     }
 }
 
-fn fit_of<const S: usize>(
-    search: &Search<'_>,
-    start: &[f64],
-    rows: &Rows<'_>,
-    speed: f64,
-    own: Own,
-) -> Option<(Normal, f64)> {
+/// The most probable state near a start, in a slice of the positions if there is one. A start is a place; positions, bias and scale; or a whole state.
+/// `None` if the information is singular.
+pub(super) fn peak(search: &Search<'_>, start: &[f64], rows: &Rows<'_>) -> Option<Peak> {
+    if search.axes() == 2 {
+        peak_of::<4>(search, start, rows)
+    } else {
+        peak_of::<MOST>(search, start, rows)
+    }
+}
+
+fn peak_of<const S: usize>(search: &Search<'_>, start: &[f64], rows: &Rows<'_>) -> Option<Peak> {
     let axes = S - 2;
-    let (mut middle, mut prior) = ([0.0; S], [0.0; S]);
-    for i in 0..axes {
-        (middle[i], prior[i]) = (search.known.middle[i], search.known.spreads[i].powi(2));
-    }
-    for (i, (mean, variance)) in search.calibration.into_iter().enumerate() {
-        (middle[axes + i], prior[axes + i]) = (mean, variance);
-    }
-    let problem = Problem {
-        search,
-        rows,
-        middle,
-        prior,
-    };
-    let mut x = middle;
+    let problem = Problem::<S>::new(search, rows);
+    let prior = problem.prior;
+    let mut x = problem.middle;
     x[..axes].copy_from_slice(start.get(..axes)?);
-    if let Some(known) = start.get(2 * axes..2 * axes + 2) {
+    let calibrated = if start.len() == S { axes } else { 2 * axes };
+    if let Some(known) = start.get(calibrated..calibrated + 2) {
         for (i, value) in known.iter().enumerate().filter(|(i, _)| prior[axes + i] > 0.0) {
             x[axes + i] = *value;
         }
@@ -259,8 +302,17 @@ fn fit_of<const S: usize>(
     let log_determinant = log_of_product(rows.variances.iter().copied().chain(of_slice).chain(gains));
     let count = (rows.ranges.len() + usize::from(rows.slice.is_some())) as f64;
     let log_evidence = -0.5 * (cost + log_determinant + count * std::f64::consts::TAU.ln());
-    let normal = law(&problem, &x, &factor, speed, own);
-    (normal.is_finite() && log_evidence.is_finite()).then_some((normal, log_evidence))
+    let mut found = Peak {
+        x: [0.0; MOST],
+        root: [[0.0; MOST]; MOST],
+        log_evidence,
+    };
+    for i in 0..S {
+        found.x[i] = x[i];
+        found.root[i][..S].copy_from_slice(&factor[i]);
+    }
+    let is_finite = log_evidence.is_finite() && x.iter().all(|x| x.is_finite());
+    is_finite.then_some(found)
 }
 
 /// The law of the whole state.
@@ -277,7 +329,9 @@ fn law<const S: usize>(problem: &Problem<'_, S>, x: &Vector<S>, factor: &Matrix<
     }
     // Where a coordinate of the problem is in the state.
     let place = |i: usize| if i < axes { i } else { axes + i };
-    let (mut mean, mut covariance) = (vec![0.0; n], vec![0.0; n * n]);
+    let (mut mean, mut covariance) = (Vec::with_capacity(n), Vec::with_capacity(n * n));
+    mean.resize(n, 0.0);
+    covariance.resize(n * n, 0.0);
     for i in 0..S {
         mean[place(i)] = x[i];
         for j in 0..S {

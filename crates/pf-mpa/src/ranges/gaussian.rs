@@ -20,6 +20,7 @@ macro_rules! of_size {
             (9, 3) => $normal.$function::<9, 3>($($argument),*),
             (10, 2) => $normal.$function::<10, 2>($($argument),*),
             (11, 2) => $normal.$function::<11, 2>($($argument),*),
+            (12, 2) => $normal.$function::<12, 2>($($argument),*),
             (_, 2) => $normal.$function::<0, 2>($($argument),*),
             _ => $normal.$function::<0, 3>($($argument),*),
         }
@@ -145,6 +146,12 @@ impl Normal {
             covariance[v * n + p] += cross;
         }
         covariance[bias * n + bias] += step.drift;
+    }
+
+    /// Gives the velocities another deviation, before they have moved anything.
+    pub(super) fn set_speed(&mut self, speed: f64) {
+        let n = self.mean.len();
+        (self.axes..2 * self.axes).for_each(|v| self.covariance[v * n + v] = speed * speed);
     }
 
     /// Makes the common bias independent of everything, with this mean and variance.

@@ -22,8 +22,20 @@ pub(super) struct Grid<'a> {
     priors: Vec<f64>,
     /// Range by range, for each the points.
     measured: Vec<Vec<f64>>,
+    /// Point by point, sums over all ranges.
+    sums: Vec<Sums>,
+    /// The middle of the ranges.
+    centre: f64,
     /// Variance of a range's error on the grid.
     variance: f64,
+}
+
+/// Sums over ranges at a point: of what is measured there, of its squares, and of its products with the ranges about their middle.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    distances: f64,
+    squares: f64,
+    products: f64,
 }
 
 impl<'a> Grid<'a> {
@@ -47,11 +59,23 @@ impl<'a> Grid<'a> {
             priors.push(prior);
         }
         let of = |one: &Collected| points.iter().map(|point| search.measured(point, one)).collect();
+        let measured: Vec<Vec<f64>> = ranges.iter().map(of).collect();
+        let centre = ranges.iter().map(|one| one.range).sum::<f64>() / ranges.len().max(1) as f64;
+        let mut sums = vec![Sums::default(); points.len()];
+        for (one, measured) in ranges.iter().zip(&measured) {
+            for (sums, d) in sums.iter_mut().zip(measured) {
+                sums.distances += d;
+                sums.squares += d * d;
+                sums.products += (one.range - centre) * d;
+            }
+        }
         // Half a step: between two nodes the likelihood must not vanish.
         let smooth = 0.5 * step * known.spreads[0] * known.size / known.anchors_spread;
         let largest = known.noises.iter().fold(0.0_f64, |most, noise| most.max(*noise));
         Self {
-            measured: ranges.iter().map(of).collect(),
+            measured,
+            sums,
+            centre,
             known,
             ranges,
             points,
@@ -61,42 +85,58 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// `ln p(position, ranges)` at all points, up to a constant, with bias and scale integrated out one range after the other.
+    /// `ln p(position, ranges)` at all points, up to a constant. Bias and scale are integrated out: ranges are linear in them, so the density
+    /// depends on sums over the ranges only, and that of all but one range on the sums less one term.
     fn values(&self, calibration: &Calibration, without: Option<usize>) -> Vec<f64> {
         let [(bias, bias_variance), (scale, scale_variance)] = *calibration;
         let relative = 1.0 / self.variance;
-        let all = self.ranges.iter().zip(&self.measured).enumerate();
-        let used: Vec<(f64, &[f64])> = all
+        let factor = 1.0 + scale;
+        let own =
+            without.and_then(|number| Some((self.ranges.get(number)?.range - self.centre, &self.measured[number])));
+        let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
+        for (_, one) in self
+            .ranges
+            .iter()
+            .enumerate()
             .filter(|(number, _)| Some(*number) != without)
-            .map(|(_, (one, measured))| (one.range, &measured[..self.points.len()]))
-            .collect();
-        let value = |(point, prior): (usize, &f64)| {
-            let (mut mean, mut p) = ([bias, scale], [bias_variance, 0.0, scale_variance]);
-            // A product of few ratios does not overflow, and one logarithm is cheaper than many.
-            let (mut total, mut ratio) = (-prior, 1.0);
-            for (number, (range, measured)) in used.iter().enumerate() {
+        {
+            // What the mean bias leaves of the range.
+            let off = one.range - bias;
+            (count, sum, squares) = (count + 1.0, sum + off, squares + off * off);
+        }
+        // What the mean bias adds to the products of ranges about their middle and distances.
+        let beyond = self.centre - bias;
+        let value = |(point, (prior, sums)): (usize, (&f64, &Sums))| {
+            let mut sums = *sums;
+            if let Some((range, measured)) = own {
                 let d = measured[point];
-                let cross = [p[0] + d * p[1], p[1] + d * p[2]];
-                let spread = cross[0] + d * cross[1] + self.variance;
-                let off = range - (1.0 + mean[1]) * d - mean[0];
-                let weight = 1.0 / spread;
-                total -= 0.5 * off * off * weight;
-                ratio *= spread * relative;
-                if number % 8 == 7 {
-                    total -= 0.5 * f64::ln(ratio);
-                    ratio = 1.0;
-                }
-                let gain = cross.map(|c| c * weight);
-                mean = [mean[0] + gain[0] * off, mean[1] + gain[1] * off];
-                p = [
-                    p[0] - gain[0] * cross[0],
-                    p[1] - gain[0] * cross[1],
-                    p[2] - gain[1] * cross[1],
-                ];
+                sums = Sums {
+                    distances: sums.distances - d,
+                    squares: sums.squares - d * d,
+                    products: sums.products - range * d,
+                };
             }
-            total - 0.5 * f64::ln(ratio)
+            let products = sums.products + beyond * sums.distances;
+            // Sums of what ranges are off at the means of bias and scale: of squares, alone, and times the distance.
+            let off = [
+                squares - factor * (2.0 * products - factor * sums.squares),
+                sum - factor * sums.distances,
+                products - factor * sums.squares,
+            ];
+            // Information about bias and scale in their deviations, of which the prior is one each.
+            let information = [
+                1.0 + bias_variance * relative * count,
+                relative * sums.distances,
+                1.0 + scale_variance * relative * sums.squares,
+            ];
+            let both = bias_variance * scale_variance * information[1] * information[1];
+            let determinant = information[0] * information[2] - both;
+            let explained = bias_variance * off[1] * off[1] * information[2]
+                + scale_variance * off[2] * off[2] * information[0]
+                - 2.0 * bias_variance * scale_variance * off[1] * off[2] * information[1];
+            -prior - 0.5 * (relative * (off[0] - relative * explained / determinant) + f64::ln(determinant))
         };
-        self.priors.iter().enumerate().map(value).collect()
+        self.priors.iter().zip(&self.sums).enumerate().map(value).collect()
     }
 
     /// Local maxima of the density of positions, given all ranges or all but one, the best first.
@@ -133,5 +173,63 @@ impl<'a> Grid<'a> {
             })
         };
         found.into_iter().flat_map(beside).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ranges::RangeSettings;
+    use nalgebra::{DMatrix, DVector, Vector3};
+
+    /// The density is that of ranges with a common covariance: noise, and what bias and scale do to all of them.
+    #[test]
+    fn values_are_the_density_of_ranges_with_bias_and_scale() {
+        let places =
+            [[0.0, 0.0], [9.0, 1.0], [8.0, 7.0], [-1.0, 6.0], [4.0, 9.0]].map(|[x, y]| Vector3::new(x, y, 0.0));
+        let known = RangeSettings::default().known(&places).unwrap();
+        let calibration = [(0.3, 1.7), (-0.02, 0.01)];
+        let search = Search {
+            known: &known,
+            calibration,
+            anchors: places.len(),
+        };
+        let collected = |(anchor, place): (usize, &Vector3<f64>)| Collected {
+            anchor,
+            place: [place.x, place.y, place.z],
+            range: 4.0 + (place - Vector3::new(3.0, 4.0, 0.0)).norm() + 0.1 * anchor as f64,
+            age: 0.0,
+            share: 1.0,
+            slope: 1.0,
+        };
+        let ranges: Vec<Collected> = places.iter().enumerate().map(collected).collect();
+        let grid = Grid::new(&search, &ranges);
+        for without in [None, Some(0), Some(3)] {
+            let used: Vec<&Collected> = (0..ranges.len())
+                .filter(|i| Some(*i) != without)
+                .map(|i| &ranges[i])
+                .collect();
+            let density = |point: usize| {
+                let far = DVector::from_iterator(
+                    used.len(),
+                    used.iter().map(|one| search.measured(&grid.points[point], one)),
+                );
+                let [(bias, of_bias), (scale, of_scale)] = calibration;
+                let off = DVector::from_fn(used.len(), |i, _| used[i].range - bias - (1.0 + scale) * far[i]);
+                let covariance = of_scale * &far * far.transpose()
+                    + DMatrix::from_element(used.len(), used.len(), of_bias)
+                    + DMatrix::identity(used.len(), used.len()) * grid.variance;
+                let root = covariance.cholesky().unwrap();
+                -grid.priors[point] - 0.5 * (off.dot(&root.solve(&off)) + root.determinant().ln())
+            };
+            let values = grid.values(&calibration, without);
+            // Up to a constant of all points.
+            let points = [0, 17, 312, 400, 624];
+            let constant = values[312] - density(312);
+            for point in points {
+                let error = values[point] - density(point) - constant;
+                assert!(error.abs() < 1e-8 * (1.0 + values[point].abs()), "{without:?}, {point}: {error}");
+            }
+        }
     }
 }

@@ -17,7 +17,7 @@ fn explained(
     settings: RangeSettings,
     ranges: &[(f64, &str, f64)],
 ) -> Result<Option<(f64, f64)>, Error> {
-    let mut tracker = RangeTracker::new(anchors.iter().cloned(), Travel::Full, settings)?;
+    let mut tracker = RangeTracker::new(anchors.iter().cloned(), Travel::Full, settings)?.rigid();
     let (mut first, mut slopes, mut noise) = (None, 0.0, 0.0);
     for (time, anchor, range) in ranges {
         let Some(found) = tracker.push(*time, anchor, *range)? else {

@@ -54,7 +54,7 @@ pub fn height_of(
             height: Height::Known(height),
             ..settings
         };
-        let mut tracker = RangeTracker::new(anchors.iter().cloned(), Travel::Full, settings)?;
+        let mut tracker = RangeTracker::new(anchors.iter().cloned(), Travel::Full, settings)?.rigid();
         let mut doubtful = 0;
         for (time, anchor, range) in ranges {
             let found = tracker.push(*time, anchor, *range)?;

@@ -57,7 +57,7 @@ fn trial(
     settings: RangeSettings,
     ranges: &[(f64, &str, f64)],
 ) -> Result<Trial, Error> {
-    let mut tracker = RangeTracker::new(anchors.iter().cloned(), Travel::Full, settings)?;
+    let mut tracker = RangeTracker::new(anchors.iter().cloned(), Travel::Full, settings)?.rigid();
     let (mut doubtful, mut count, mut sum, mut squares) = (0, 0.0, 0.0, 0.0);
     for (time, anchor, range) in ranges {
         let found = tracker.push(*time, anchor, *range)?;

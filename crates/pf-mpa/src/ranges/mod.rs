@@ -40,6 +40,8 @@ mod rows;
 mod search;
 mod settings;
 mod step;
+mod walk;
+mod walking;
 
 pub use estimate::RangeEstimate;
 pub use growth::proportion_of;
@@ -50,7 +52,6 @@ pub use settings::{Height, RangeSettings};
 use crate::Error;
 use crate::loading::optimal_loading;
 use crate::quantized::{QuantizedRange, RangeReference};
-use acquisition::hypotheses;
 use arrived::Arrived;
 use bank::Hypothesis;
 use fewbits_core::Gaussian;
@@ -63,10 +64,11 @@ use mirror::add_mirrored;
 use nalgebra::Vector3;
 use odds::{ASIDE, count_contradictions, drop_improbable, is_lost, merge_same, shares_of, uncertainty_of_noise, weigh};
 use residuals::Residuals;
-use rows::{Collected, Latest};
-use settings::{Known, NEGLIGIBLE_OF_LEVELS};
+use rows::Latest;
+use settings::{Known, NEEDLESS_OF_LEVELS, NEGLIGIBLE_OF_LEVELS};
 use std::collections::BTreeMap;
 use step::Step;
+use walking::with_walks;
 
 /// Ranges between two searches for hypotheses that have become the same.
 const COMPARED: usize = 8;
@@ -110,6 +112,8 @@ pub struct RangeTracker {
     /// `ln` of the evidence that was taken off the hypotheses' weights.
     evidence: f64,
     residuals: Vec<Residuals>,
+    /// Whether biases of single anchors may walk.
+    has_walks: bool,
 }
 
 impl RangeTracker {
@@ -140,7 +144,7 @@ impl RangeTracker {
         let places: Vec<Vector3<f64>> = anchors.values().copied().collect();
         let mut known = settings.known(&places)?;
         if travel != Travel::Full {
-            known.negligible = NEGLIGIBLE_OF_LEVELS;
+            (known.negligible, known.needless) = (NEGLIGIBLE_OF_LEVELS, NEEDLESS_OF_LEVELS);
             known.anchor_biases.retain(|(own, _)| own.only().is_none());
         }
         Ok(Self {
@@ -159,6 +163,10 @@ impl RangeTracker {
             tried: 0,
             calibration: [(0.0, known.bias * known.bias), (0.0, known.scale * known.scale)],
             residuals: vec![Residuals::default(); places.len()],
+            has_walks: travel == Travel::Full
+                && settings.anchor_bias.is_none()
+                && known.bias > 0.0
+                && known.clock.is_none(),
             known,
             last: f64::NEG_INFINITY,
             at: f64::NEG_INFINITY,
@@ -187,6 +195,7 @@ impl RangeTracker {
             Measured::Logarithm { unit } => (positive("range", range)? / unit).ln(),
         };
         let (is_new, elapsed) = (time > self.last, time - self.last);
+        let since = time - self.heard[anchor];
         if elapsed > self.known.silence {
             self.pause();
             self.collected.clear();
@@ -202,10 +211,15 @@ impl RangeTracker {
         let mut next = std::mem::take(&mut self.next);
         next.clone_from(&self.hypotheses);
         let lost = match self.track(&mut next, time - self.at, is_new, anchor, (range, share)) {
-            Ok((taken, residual)) => {
+            Ok((taken, residual, deviation)) => {
                 self.evidence += taken;
                 if self.travel == Travel::Full && (self.known.clock.is_none() || !is_new) {
-                    self.residuals[anchor].observe(residual);
+                    self.residuals[anchor].observe(residual, deviation, since);
+                }
+                let variant = self.known.anchor_biases.len() + self.pushed;
+                if self.has_walks && self.pushed.is_multiple_of(COMPARED) {
+                    let mut walking = with_walks(&self.known, &mut next, &mut self.residuals, variant);
+                    next.append(&mut walking);
                 }
                 is_lost(&next, self.travel != Travel::Full)
             }
@@ -248,7 +262,7 @@ impl RangeTracker {
             self.collected.clear();
             if !self.hypotheses.is_empty() {
                 let mut next = self.hypotheses.clone();
-                if let Ok((taken, _)) = self.track(&mut next, time - self.at, true, anchor, (found.range, found.share))
+                if let Ok((taken, ..)) = self.track(&mut next, time - self.at, true, anchor, (found.range, found.share))
                 {
                     self.hypotheses = next;
                     self.at = time;
@@ -269,23 +283,8 @@ impl RangeTracker {
         }
     }
 
-    fn acquire(&mut self, time: f64) {
-        let rows: Vec<Collected> = self
-            .collected
-            .iter()
-            .map(|(anchor, latest)| latest.seen_at(time, *anchor, &self.places[*anchor], self.known.measured))
-            .collect();
-        self.residuals.iter_mut().for_each(Residuals::interrupt);
-        self.hypotheses = hypotheses(&self.known, self.places.len(), self.calibration, &rows);
-        self.tried = 0;
-        let mut found = std::mem::take(&mut self.hypotheses);
-        self.evidence = drop_improbable(&mut found, self.known.negligible);
-        self.hypotheses = found;
-        self.at = time;
-    }
-
     /// Moves hypotheses on and updates them with a range. Returns `ln` of the evidence that was taken off their weights, and the range's residual in
-    /// its predicted deviation.
+    /// its predicted deviation, and that.
     fn track(
         &self,
         next: &mut Vec<Hypothesis>,
@@ -293,7 +292,7 @@ impl RangeTracker {
         is_new: bool,
         anchor: usize,
         (range, of_noise): (f64, f64),
-    ) -> Result<(f64, f64), Error> {
+    ) -> Result<(f64, f64, f64), Error> {
         let (known, place) = (&self.known, &self.places[anchor]);
         let step = Step::over(elapsed, known.persistence, known.drift);
         let shares = shares_of(next);
@@ -309,7 +308,8 @@ impl RangeTracker {
             square += share * (variance + expected * expected);
             expectations.push((expected, variance));
         }
-        let residual = (range - mean) / (square - mean * mean).max(f64::MIN_POSITIVE).sqrt();
+        let deviation = (square - mean * mean).max(f64::MIN_POSITIVE).sqrt();
+        let residual = (range - mean) / deviation;
         let arrived = match self.travel {
             Travel::Full if known.clock.is_some() && is_new => Arrived::First(f64::from(range as f32)),
             Travel::Full => Arrived::Value(f64::from(range as f32)),
@@ -384,7 +384,7 @@ impl RangeTracker {
             let is_carried = self.collected.values().any(|latest| latest.moved != [0.0; 3]);
             add_mirrored(known, next, is_carried);
         }
-        Ok((taken, residual))
+        Ok((taken, residual, deviation))
     }
 
     fn estimate(&self, lost: bool) -> Option<RangeEstimate> {

@@ -116,13 +116,18 @@ pub(super) fn weigh(hypotheses: &mut [Hypothesis], evidences: &[(bool, f64)]) {
     }
 }
 
+/// Whether a hypothesis whose `ln` of the probability is so much that of the best one's is kept.
+pub(super) fn is_worth(log_ratio: f64, negligible: f64) -> bool {
+    log_ratio > negligible.max(LEAST).ln()
+}
+
 /// Drops hypotheses that are improbable beside the best one. Returns what was taken off the `ln` of all weights: only differences matter.
 pub(super) fn drop_improbable(hypotheses: &mut Vec<Hypothesis>, negligible: f64) -> f64 {
     let best = hypotheses
         .iter()
         .map(Hypothesis::log_share)
         .fold(f64::NEG_INFINITY, f64::max);
-    hypotheses.retain(|one| one.log_share() - best > negligible.max(LEAST).ln());
+    hypotheses.retain(|one| is_worth(one.log_share() - best, negligible));
     if !best.is_finite() {
         return 0.0;
     }

@@ -12,18 +12,51 @@ const SURE: f64 = 6.0;
 /// Products of successive residuals of one anchor, each in its predicted deviation.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Residuals {
-    last: Option<f64>,
+    /// The last residual, and its deviation.
+    last: Option<(f64, f64)>,
     sum: f64,
     count: f64,
+    pub(super) recent: Recent,
+}
+
+/// Share of a product that stays among the latest ones with each range.
+const RECALLED: f64 = 0.97;
+
+/// Sums over the latest products, the older the less.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Recent {
+    pub(super) sum: f64,
+    /// Of the sum, for independent residuals.
+    pub(super) variance: f64,
+    pub(super) weight: f64,
+    /// The same sum in the unit of ranges, squared.
+    pub(super) squares: f64,
+    /// From range to range.
+    pub(super) seconds: f64,
 }
 
 impl Residuals {
-    pub(super) fn observe(&mut self, residual: f64) {
+    /// Takes in a residual in its deviation, so many seconds behind the last one.
+    pub(super) fn observe(&mut self, residual: f64, deviation: f64, seconds: f64) {
         let residual = residual.clamp(-LARGEST, LARGEST);
-        if let Some(last) = self.last.replace(residual) {
-            self.sum += last * residual;
+        if let Some((last, its)) = self.last.replace((residual, deviation)) {
+            let product = last * residual;
+            self.sum += product;
             self.count += 1.0;
+            let recent = &mut self.recent;
+            *recent = Recent {
+                sum: RECALLED * recent.sum + product,
+                variance: RECALLED * RECALLED * recent.variance + 1.0,
+                weight: RECALLED * recent.weight + 1.0,
+                squares: RECALLED * recent.squares + product * its * deviation,
+                seconds: RECALLED * recent.seconds + seconds,
+            };
         }
+    }
+
+    /// Forgets the latest products.
+    pub(super) fn forget_recent(&mut self) {
+        self.recent = Recent::default();
     }
 
     /// Forgets the last residual, since the next one belongs to another place.

@@ -1,6 +1,6 @@
 //! Places that explain a set of ranges, from starts, and the filters of a place.
 
-use super::fit::{Search, fit};
+use super::fit::{Peak, Search, peak};
 use super::gaussian::Normal;
 use super::rows::{Collected, Rows, Slice};
 use super::settings::Own;
@@ -47,27 +47,27 @@ impl Search<'_> {
         without: Option<usize>,
         speed: f64,
     ) -> Option<Found> {
-        let mut best: Option<Found> = None;
-        let mut from = start.to_vec();
+        let mut best: Option<(Peak, f64)> = None;
+        let mut from: Option<Peak> = None;
         // From the largest noise down: the place of one is the start of the next.
         for noise in self.known.noises.iter().rev().step_by(NOISES_TRIED) {
-            let Some((normal, log_evidence)) =
-                fit(self, &from, &Rows::new(ranges, *noise, speed, NONE, None), speed, NONE)
-            else {
+            let near = from.as_ref().map_or(start, |from| from.start(self.axes()));
+            let Some(found) = peak(self, near, &Rows::new(ranges, *noise, speed, NONE, None)) else {
                 continue;
             };
-            from.clone_from(&normal.mean);
-            if best.as_ref().is_none_or(|best| log_evidence > best.log_evidence) {
-                best = Some(Found {
-                    without,
-                    normal,
-                    log_evidence,
-                    noise: *noise,
-                    slice: None,
-                });
+            from = Some(found);
+            if best.is_none_or(|(best, _)| found.log_evidence > best.log_evidence) {
+                best = Some((found, *noise));
             }
         }
-        best
+        let (best, noise) = best?;
+        Some(Found {
+            without,
+            normal: best.law(self, &Rows::new(ranges, noise, speed, NONE, None), speed, NONE)?,
+            log_evidence: best.log_evidence,
+            noise,
+            slice: None,
+        })
     }
 
     /// Cuts a place whose law is too long for one linearisation into slices across its longest direction, at most `finest` in a deviation of it. Empty
@@ -104,7 +104,11 @@ impl Search<'_> {
                     deviation,
                 };
                 let rows = Rows::new(ranges, one.noise, speed, NONE, Some(slice));
-                let Some((normal, log_evidence)) = fit(self, &from, &rows, speed, NONE) else {
+                let Some(found_peak) = peak(self, &from, &rows) else {
+                    break;
+                };
+                let log_evidence = found_peak.log_evidence;
+                let Some(normal) = found_peak.law(self, &rows, speed, NONE) else {
                     break;
                 };
                 from.clone_from(&normal.mean);
@@ -129,64 +133,106 @@ impl Search<'_> {
     pub(super) fn evidence(&self, one: &Found, ranges: &[Collected], own: Own) -> Option<f64> {
         let speed = self.known.speeds[self.known.middle_speed];
         let rows = Rows::new(ranges, one.noise, speed, own, one.slice);
-        let (_, log_evidence) = fit(self, &one.normal.mean, &rows, speed, own)?;
-        Some(log_evidence + one.log_share())
+        Some(peak(self, &one.normal.mean, &rows)?.log_evidence + one.log_share())
     }
 
-    /// The filters of a place with their weights, and its evidence over all of them.
-    pub(super) fn bank(&self, one: &Found, ranges: &[Collected], own: Own) -> Option<(Vec<Normal>, Vec<f64>, f64)> {
+    /// The peaks of the filters of a place with their weights, and its evidence over all of them.
+    pub(super) fn bank(&self, one: &Found, ranges: &[Collected], own: Own) -> Option<Bank> {
         let (speeds, noises) = (&self.known.speeds, &self.known.noises);
         let count = speeds.len() * noises.len();
-        let (mut filters, mut logs) = (Vec::with_capacity(count), Vec::with_capacity(count));
-        // Of each fit its number, and the variances of the ranges.
-        let mut fitted: Vec<(usize, Rows<'_>)> = Vec::with_capacity(count);
         // Of many, every second is tried, counted from the largest. Those between take their places if evidence is for them.
         let is_tried = |index: usize, count: usize| count <= FEW || (count - 1 - index).is_multiple_of(2);
+        let tried = |list: &[f64]| (0..list.len()).filter(|i| is_tried(*i, list.len())).count();
+        let mut peaks: Vec<(usize, Peak)> = Vec::with_capacity(tried(speeds) * tried(noises));
+        // Of each fit its peak, and the variances of the ranges.
+        let mut fitted: Vec<(Option<Peak>, Rows<'_>)> = Vec::with_capacity(peaks.capacity());
         // The place of one filter is the start of the next.
-        let (mut near, mut first): (Option<usize>, Option<usize>) = (None, None);
-        for (at, speed) in speeds.iter().enumerate() {
+        let (mut near, mut first): (Option<Peak>, Option<Peak>) = (None, None);
+        for (at, speed) in speeds.iter().enumerate().filter(|(at, _)| is_tried(*at, speeds.len())) {
             near = first.take().or(near);
-            for (of_speed, noise) in noises.iter().enumerate() {
-                if !is_tried(at, speeds.len()) || !is_tried(of_speed, noises.len()) {
-                    filters.push(Normal::unknown());
-                    logs.push(f64::NEG_INFINITY);
-                    continue;
-                }
+            for (of_speed, noise) in noises.iter().enumerate().filter(|(at, _)| is_tried(*at, noises.len())) {
                 let rows = Rows::new(ranges, *noise, *speed, own, one.slice);
                 let is_alike = |known: &Rows<'_>| {
                     let mut pairs = rows.variances.iter().zip(&known.variances);
                     pairs.all(|(a, b)| *a < ALIKE * b && *b < ALIKE * a)
                 };
-                let number = filters.len();
-                let (normal, log) = if let Some((same, _)) = fitted.iter().find(|(_, known)| is_alike(known)) {
-                    let mut normal: Normal = filters[*same].clone();
-                    let n = normal.mean.len();
-                    (normal.axes..2 * normal.axes).for_each(|v| normal.covariance[v * n + v] = speed * speed);
-                    (normal, logs[*same])
+                let found = if let Some((same, _)) = fitted.iter().find(|(_, known)| is_alike(known)) {
+                    *same
                 } else {
-                    let start = near.map_or(&one.normal.mean, |near| &filters[near].mean);
-                    let found = fit(self, start, &rows, *speed, own);
-                    fitted.push((number, rows));
-                    found.unwrap_or((Normal::unknown(), f64::NEG_INFINITY))
+                    let start = near
+                        .as_ref()
+                        .map_or(&one.normal.mean[..], |near| near.start(self.axes()));
+                    let found = peak(self, start, &rows);
+                    fitted.push((found, rows));
+                    found
                 };
-                if log.is_finite() {
-                    (near, first) = (Some(number), first.or(Some(number)));
+                if let Some(found) = found {
+                    (near, first) = (Some(found), first.or(Some(found)));
+                    peaks.push((at * noises.len() + of_speed, found));
                 }
-                filters.push(normal);
-                logs.push(log);
             }
         }
-        let highest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let logs = peaks.iter().map(|(_, peak)| peak.log_evidence);
+        let highest = logs.clone().fold(f64::NEG_INFINITY, f64::max);
         if highest == f64::NEG_INFINITY {
             return None;
         }
-        let mut weights = logs;
-        weights
-            .iter_mut()
-            .for_each(|weight| *weight = (*weight - highest).exp());
+        let mut weights: Vec<f64> = logs.map(|log| (log - highest).exp()).collect();
         let total: f64 = weights.iter().sum();
         weights.iter_mut().for_each(|weight| *weight /= total);
         let log_evidence = highest + (total / count as f64).ln() + one.log_share();
-        Some((filters, weights, log_evidence))
+        Some(Bank {
+            peaks,
+            weights,
+            log_evidence,
+        })
     }
+
+    /// The laws of a bank's filters, and their weights: those of less than the weight `least` are left out.
+    pub(super) fn laws(
+        &self,
+        bank: &Bank,
+        one: &Found,
+        ranges: &[Collected],
+        own: Own,
+        least: f64,
+    ) -> (Vec<Normal>, Vec<f64>) {
+        let (speeds, noises) = (&self.known.speeds, &self.known.noises);
+        let count = speeds.len() * noises.len();
+        let least = bank.weights.iter().copied().fold(0.0, f64::max).min(least);
+        let (mut laws, mut weights) = (Vec::with_capacity(count), vec![0.0; count]);
+        laws.resize_with(count, Normal::unknown);
+        let mut last: Option<(&Peak, usize)> = None;
+        for ((number, peak), weight) in bank
+            .peaks
+            .iter()
+            .zip(&bank.weights)
+            .filter(|(_, weight)| **weight >= least)
+        {
+            let (speed, noise) = (speeds[number / noises.len()], noises[number % noises.len()]);
+            let found = match last.filter(|(other, _)| other.is_same(peak)) {
+                Some((_, same)) => {
+                    let mut same: Normal = laws[same].clone();
+                    same.set_speed(speed);
+                    Some(same)
+                }
+                None => peak.law(self, &Rows::new(ranges, noise, speed, own, one.slice), speed, own),
+            };
+            if let Some(found) = found {
+                (laws[*number], weights[*number]) = (found, *weight);
+                last = Some((peak, *number));
+            }
+        }
+        let total: f64 = weights.iter().sum();
+        weights.iter_mut().for_each(|weight| *weight /= total);
+        (laws, weights)
+    }
+}
+
+/// The filters of a place before their laws are built.
+pub(super) struct Bank {
+    /// Numbers and peaks of the filters that were tried.
+    peaks: Vec<(usize, Peak)>,
+    weights: Vec<f64>,
+    pub(super) log_evidence: f64,
 }

@@ -39,6 +39,11 @@ const STATED: f64 = 4.0;
 /// Weight below which a filter is left out. A level says less than a range in full, so of levels more filters stay probable.
 const NEGLIGIBLE: f64 = 1e-4;
 pub(super) const NEGLIGIBLE_OF_LEVELS: f64 = 5e-5;
+/// Share of the first places that is left out.
+const NEEDLESS: f64 = 3e-3;
+pub(super) const NEEDLESS_OF_LEVELS: f64 = 1e-3;
+/// A filter of more weight in its hypothesis is kept, however improbable the hypothesis is.
+const LEAST_WEIGHT: f64 = 3e-3;
 /// Deviation by which the bias changes in a second, as a share of its own.
 const DRIFT: f64 = 0.002;
 
@@ -201,11 +206,18 @@ pub(super) struct Known {
     pub(super) silence: f64,
     /// A filter of less weight is left out until changes from its neighbours reach it again, and a smaller share of these does not change a filter.
     pub(super) negligible: f64,
+    /// Of the pieces and slices of places those of the least probability are left out: together of this share.
+    pub(super) needless: f64,
     /// Deviation of the clock, if it is unknown.
     pub(super) clock: Option<f64>,
 }
 
 impl Known {
+    /// The weight below which a filter of a hypothesis of this probability is left out: the less it is, the fewer filters are kept.
+    pub(super) fn least_weight(&self, share: f64) -> f64 {
+        (self.negligible / share).clamp(self.negligible, LEAST_WEIGHT)
+    }
+
     /// Leaves out that the target rests.
     pub(super) fn leave_rest_out(&mut self) {
         if self.has_rest {
@@ -366,6 +378,7 @@ impl RangeSettings {
             anchor_biases,
             silence: self.silence,
             negligible: NEGLIGIBLE,
+            needless: NEEDLESS,
             clock: self.unknown_clock.then_some(shares::CLOCK * spread),
         })
     }

@@ -3,6 +3,7 @@
 /// What a stretch of time does to positions and velocities of one axis.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step {
+    pub(super) seconds: f64,
     /// The velocity's share that stays, and the seconds that it lasts.
     pub(super) kept: f64,
     pub(super) reach: f64,
@@ -26,6 +27,7 @@ impl Step {
         };
         let lost = -(-u).exp_m1();
         Self {
+            seconds,
             kept,
             reach: persistence * lost,
             position: persistence * persistence * position,

@@ -11,4 +11,5 @@ mod odometry;
 mod recording;
 mod rooms;
 mod strengths;
+mod walks;
 mod wild;

@@ -127,19 +127,6 @@ fn walk(room: &Room, seed: u64, travel: Travel, settings: RangeSettings) -> Outc
             .normalised_error(&truth)
             .unwrap_or_else(|| panic!("seed {seed}, range {k}: {found:?}"));
         outcome.nees += nees;
-        if std::env::var("W5D").is_ok() && k % 20 == 19 {
-            eprintln!(
-                "    truth {:.2} {:.2} nees {:.1} long {:?} bias {:.2} scale {:.3} places {} doubtful {}",
-                truth.x,
-                truth.y,
-                nees,
-                room.long.map(|(a, b)| (a % room.anchors.len(), b)),
-                room.bias,
-                room.scale,
-                found.places,
-                found.is_doubtful
-            );
-        }
         outcome.squares += (found.position - truth).norm_squared();
         wrong = if nees > WRONG && !found.lost { wrong + 1 } else { 0 };
         outcome.longest_wrong = outcome.longest_wrong.max(wrong);

@@ -306,6 +306,7 @@ impl RangesTracker {
             ..
         } = self;
         (summary.bits, summary.losses) = (tracker.bits(), tracker.losses());
+        summary.walking_biases = tracker.walking_biases();
         summary.bits_per_range = summary.bits as f64 / (summary.ranges as f64).max(1.0);
         for anchor in &mut summary.anchors {
             let name = &anchor.name;
@@ -365,8 +366,10 @@ impl RangesTracker {
         // A level says little: chance alone contradicts for a while.
         let least = if options.travel == Travel::Full { 0.5 } else { SURELY };
         let is_wrong = |one: &AnchorSummary| one.works < least || one.own_bias.is_some() || one.lasting.is_some();
-        let is_suspect =
-            summary.losses > 0 || OFTEN * summary.doubtful > summary.rows || summary.anchors.iter().any(is_wrong);
+        let is_suspect = summary.losses > 0
+            || OFTEN * summary.doubtful > summary.rows
+            || summary.anchors.iter().any(is_wrong)
+            || summary.walking_biases.is_some();
         if is_suspect {
             summary.mistake = mistake(&anchors, settings, &first);
             summary.hints.extend(summary.mistake.as_ref().and_then(mended));

@@ -37,6 +37,9 @@ pub struct RangesSummary {
     pub losses: usize,
     /// The anchors.
     pub anchors: Vec<AnchorSummary>,
+    /// Standard deviation of the biases of single anchors that walk, and the seconds after which one is forgotten.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub walking_biases: Option<(f64, f64)>,
     /// What the ranges suggest that no option says, a sentence each, as [`LevelSummary::hints`](crate::LevelSummary::hints).
     pub hints: Vec<String>,
     /// The mistake of the tables that explains the ranges.
@@ -87,6 +90,7 @@ impl RangesSummary {
             zero: 0,
             losses: 0,
             anchors: anchors.iter().map(anchor).collect(),
+            walking_biases: None,
             hints: Vec::new(),
             mistake: None,
             lines: Vec::new(),
@@ -162,6 +166,17 @@ pub(crate) fn lines(
                 anchor.name
             ));
         }
+    }
+    if let Some((deviation, seconds)) = summary.walking_biases.filter(|_| !is_height) {
+        let size = if settings.proportional {
+            format!("{} %", short(100.0 * deviation))
+        } else {
+            short(deviation)
+        };
+        lines.push(format!(
+            "biases of single anchors change, by about {size} within {} s, and the bands allow for it: clocks drift, something comes and goes before anchors, or one stands elsewhere than its table says",
+            short(seconds)
+        ));
     }
     let lasting: Vec<(&str, f64)> = summary
         .anchors
