@@ -34,8 +34,30 @@ const DAYS: [&str; 7] = [
     "sunday",
 ];
 
-/// Beginnings of the names of months in other languages: German, Dutch, Swedish, French, Spanish, Italian, Portuguese.
-const OTHERS: [(&str, usize); 26] = [
+/// Beginnings of the names of months in other languages: German, Dutch, Swedish, French, Spanish, Italian, Portuguese, Russian, Turkish.
+const OTHERS: [(&str, usize); 48] = [
+    ("янв", 0),
+    ("фев", 1),
+    ("мар", 2),
+    ("апр", 3),
+    ("май", 4),
+    ("мая", 4),
+    ("июн", 5),
+    ("июл", 6),
+    ("авг", 7),
+    ("сен", 8),
+    ("окт", 9),
+    ("ноя", 10),
+    ("дек", 11),
+    ("oca", 0),
+    ("şub", 1),
+    ("nis", 3),
+    ("haz", 5),
+    ("tem", 6),
+    ("ağu", 7),
+    ("eyl", 8),
+    ("kas", 10),
+    ("ara", 11),
     ("ene", 0),
     ("gen", 0),
     ("fév", 1),
