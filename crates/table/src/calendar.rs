@@ -34,8 +34,8 @@ const DAYS: [&str; 7] = [
     "sunday",
 ];
 
-/// Beginnings of the names of months in other languages: German, Dutch, Swedish, French, Spanish, Italian, Portuguese, Russian, Turkish.
-const OTHERS: [(&str, usize); 48] = [
+/// Beginnings of the names of months in other languages: German, Dutch, Swedish, French, Spanish, Italian, Portuguese, Russian.
+const OTHERS: [(&str, usize); 39] = [
     ("янв", 0),
     ("фев", 1),
     ("мар", 2),
@@ -49,15 +49,6 @@ const OTHERS: [(&str, usize); 48] = [
     ("окт", 9),
     ("ноя", 10),
     ("дек", 11),
-    ("oca", 0),
-    ("şub", 1),
-    ("nis", 3),
-    ("haz", 5),
-    ("tem", 6),
-    ("ağu", 7),
-    ("eyl", 8),
-    ("kas", 10),
-    ("ara", 11),
     ("ene", 0),
     ("gen", 0),
     ("fév", 1),

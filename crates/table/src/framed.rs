@@ -7,7 +7,7 @@ use crate::dialect::Dialect;
 use crate::head::Head;
 use crate::lines::MAX_LINE;
 use crate::{guess, number};
-use std::io::{BufRead, Read};
+use std::io::{BufRead, Cursor, Read};
 
 /// What stands around the cells of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,8 +92,11 @@ impl Frame {
             return false;
         };
         let lines = &lines[first..];
-        let rows: Vec<&&str> = lines.iter().filter(|line| self.has(line)).collect();
-        let rules = lines.iter().filter(|line| self.is_rule(line)).count();
+        let rows: Vec<&&str> = lines
+            .iter()
+            .filter(|line| self.has(line) && !self.plain(line).is_empty())
+            .collect();
+        let rules = lines.iter().filter(|line| self.plain(line).is_empty()).count();
         let count = |line: &str| {
             self.delimiter()
                 .map_or(1, |mark| self.plain(line).matches(mark).count())
@@ -210,42 +213,52 @@ fn is_drawn(c: char) -> bool {
 pub(crate) struct Framed {
     source: Box<dyn BufRead + Send>,
     frame: Frame,
-    line: Vec<u8>,
+    /// Lines of cells that are not handed out yet, from `at` on.
+    lines: Vec<u8>,
     at: usize,
 }
 
 impl Framed {
-    pub(crate) fn new(source: Box<dyn BufRead + Send>, frame: Frame) -> Self {
+    /// A reader of bytes that were read, and of those behind them.
+    pub(crate) fn new(first: &[u8], rest: Box<dyn BufRead + Send>, frame: Frame) -> Self {
+        let whole = first.iter().rposition(|c| *c == b'\n').map_or(0, |last| last + 1);
+        let (lines, begun) = first.split_at(whole);
         Self {
-            source,
+            lines: lines
+                .split_inclusive(|c| *c == b'\n')
+                .flat_map(|line| plain(frame, line))
+                .collect(),
+            source: Box::new(Cursor::new(begun.to_vec()).chain(rest)),
             frame,
-            line: Vec::new(),
             at: 0,
         }
     }
 }
 
+/// A line with its end. What is no text is left as it is, and refused by those that read it.
+fn plain(frame: Frame, line: &[u8]) -> Vec<u8> {
+    let end = line
+        .iter()
+        .rposition(|c| !matches!(c, b'\r' | b'\n'))
+        .map_or(0, |last| last + 1);
+    match std::str::from_utf8(&line[..end]) {
+        Ok(text) => [frame.plain(text).as_bytes(), &line[end..]].concat(),
+        Err(_) => line.to_vec(),
+    }
+}
+
 impl Read for Framed {
     fn read(&mut self, target: &mut [u8]) -> std::io::Result<usize> {
-        if self.at == self.line.len() {
+        if self.at == self.lines.len() {
             let mut line = Vec::new();
             self.source
                 .by_ref()
                 .take(MAX_LINE as u64)
                 .read_until(b'\n', &mut line)?;
-            self.at = 0;
-            let end = line
-                .iter()
-                .rposition(|c| !matches!(c, b'\r' | b'\n'))
-                .map_or(0, |last| last + 1);
-            // What is no text is refused by those that read it.
-            self.line = match std::str::from_utf8(&line[..end]) {
-                Ok(text) => [self.frame.plain(text).as_bytes(), &line[end..]].concat(),
-                Err(_) => line,
-            };
+            (self.lines, self.at) = (plain(self.frame, &line), 0);
         }
-        let count = target.len().min(self.line.len() - self.at);
-        target[..count].copy_from_slice(&self.line[self.at..self.at + count]);
+        let count = target.len().min(self.lines.len() - self.at);
+        target[..count].copy_from_slice(&self.lines[self.at..self.at + count]);
         self.at += count;
         Ok(count)
     }

@@ -80,12 +80,9 @@ pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Doubt>> {
             return Some(Err(doubt));
         }
     }
-    let is_worded = cells.iter().all(|cell| {
-        cell.trim()
-            .bytes()
-            .take(7)
-            .any(|c| c.is_ascii_alphabetic() && c != b'T')
-    });
+    let is_worded = cells
+        .iter()
+        .all(|cell| cell.trim().chars().take(7).any(|c| c.is_alphabetic() && c != 'T'));
     match (dmy, mdy) {
         (true, true) if is_dotted || is_worded => Some(Ok(Syntax::Date(Order::Dmy))),
         (true, true) => Some(Err(Doubt::DayOrMonth)),

@@ -32,8 +32,8 @@ impl Table {
             if let Some(mark) = frame.delimiter() {
                 dialect.delimiter.get_or_insert(mark.to_owned());
             }
-            let whole = Cursor::new(std::mem::take(&mut head.bytes)).chain(reader);
-            reader = Box::new(BufReader::new(Framed::new(Box::new(whole), frame)));
+            let framed = Framed::new(&head.bytes, reader, frame);
+            reader = Box::new(BufReader::with_capacity(head::MAX_BYTES, framed));
             head = Head::read(&mut *reader)?;
         }
         if head.lines.is_empty() && head.bytes.len() >= head::MAX_BYTES {
@@ -333,7 +333,9 @@ fn first_profiles(head: &Head, rows: &Rows, columns: &[Column], dialect: &Dialec
     loop {
         match first.next(&mut row) {
             Ok(None) => break,
-            Ok(Some(())) if row.cells.len() >= columns.len() && !first.is_header_again(&row) => {
+            Ok(Some(()))
+                if (row.cells.len() >= columns.len() || dialect.short_rows) && !first.is_header_again(&row) =>
+            {
                 let place = Place {
                     line: from + row.line,
                     row: 0,

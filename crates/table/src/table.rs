@@ -10,7 +10,7 @@ use crate::missing::Spellings;
 use crate::names;
 use crate::number;
 use crate::plain::Scanner;
-use crate::profile::Profile;
+use crate::profile::{Meaning, Profile};
 use crate::rows::Rows;
 use crate::survey::Survey;
 use crate::words::Words;
@@ -284,11 +284,14 @@ impl Table {
         Ok(())
     }
 
-    /// Whether the first lines have numbers in every selected column, and nothing else: then nothing is learned by a
-    /// [`survey`](Self::survey) of their kinds.
+    /// Whether the first lines have numbers in every selected column, and nothing else, and no name says that they are identifiers: then
+    /// nothing is learned by a [`survey`](Self::survey) of their kinds.
     pub fn is_plain(&self) -> bool {
         let mut selected = self.selected.iter();
-        selected.all(|i| self.columns[*i].kind == Kind::Number && self.profiles[*i].numbers > 0)
+        selected.all(|i| {
+            let profile = &self.profiles[*i];
+            self.columns[*i].kind == Kind::Number && profile.numbers > 0 && profile.meaning == Meaning::Open
+        })
     }
 
     /// The selected columns of numbers whose digits have zeros in front in the first rows, which are lost, and a cell of each.
