@@ -86,7 +86,7 @@ function said() {
     .map((name) => name.trim().replace(/^"(.*)"$/, (_, inner) => inner.replaceAll('""', '"'))).filter(Boolean);
   for (const [name, value] of form) {
     if (["without", "tolerance"].includes(name) || value === "") continue;
-    dialect[name] = value === "on" ? true : ["missing", "time-column"].includes(name) ? names(value) : /^skip/.test(name) ? +value : value;
+    dialect[name] = value === "on" ? true : ["missing", "time-column", "words"].includes(name) ? names(value) : /^skip/.test(name) ? +value : value;
   }
   return { dialect, without: names(form.get("without")), tolerance: +form.get("tolerance"), numbered: form.get("tolerance") === "" };
 }

@@ -4,7 +4,7 @@ use crate::arguments::TableOptions;
 use crate::clock;
 use crate::error::Error;
 use crate::files::is_regular;
-use crate::opening::{chosen, decided, name_of, time_columns};
+use crate::opening::{chosen, decided, name_of, tell_zeros, time_columns};
 use crate::say::say;
 use fewbits_recipes::{table as recipe, times};
 use fewbits_record::{Integers, TimeBase};
@@ -59,6 +59,7 @@ impl Table {
             table.use_survey(&survey);
             learned = Some(survey);
         }
+        tell_zeros(&table, name_of(options));
         let mut open = Self {
             names: Vec::new(),
             file: name_of(options).to_owned(),

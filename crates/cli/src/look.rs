@@ -142,6 +142,13 @@ fn text(look: &Look) -> String {
                     writeln!(text, "  all of its cells: if it is text, say --without {}", names::as_argument([&name]));
             }
         }
+        if let Some(cell) = &column.lost_zeros {
+            let _ = writeln!(
+                text,
+                "  `{cell}` is taken for a number, without its zeros in front: --words {} keeps up to 256 different texts",
+                names::as_argument([&name])
+            );
+        }
         if let Some(value) = column.sentinel {
             let _ = writeln!(
                 text,

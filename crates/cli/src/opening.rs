@@ -152,6 +152,18 @@ fn tell_first(table: &fewbits_table::Table, file: &str) {
     }
 }
 
+/// Says of columns of numbers that zeros in front of digits are not kept, as of `007`.
+pub(crate) fn tell_zeros(table: &fewbits_table::Table, file: &str) {
+    for (column, cell) in table.lost_zeros() {
+        say!(
+            "note: {file}: `{cell}` of the column `{}` is taken for a number, without its zeros in front: --words {} keeps up to 256 different \
+             texts",
+            crate::say::name(&column.name),
+            names::as_argument([fewbits_table::printable(&column.name)])
+        );
+    }
+}
+
 fn select(
     table: &mut fewbits_table::Table,
     columns: &[String],

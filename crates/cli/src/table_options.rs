@@ -84,8 +84,12 @@ pub(crate) struct DialectOptions {
     /// Spellings of gaps besides the usual ones, as `-9999,ERR`; of one column as `wind=999`.
     #[arg(long, value_name = "TEXTS", allow_hyphen_values = true)]
     pub(crate) missing: Option<String>,
+    /// Columns whose cells are words though they could be numbers or times, as `007`, `1e5` and `1.10`: up to 256 different ones.
+    #[arg(long, value_name = "NAMES")]
+    pub(crate) words: Option<String>,
     /// How times are written: as '%d.%m.%Y %H:%M:%S', the order `dmy`, `mdy` or `ymd`, the unit of numbers `s`, `ms`, `us`, `ns`,
-    /// `min`, `h` or `d`, or `excel`, `matlab`, `mjd`, `jd`, `labview` for numbers of days or seconds as of these.
+    /// `min`, `h` or `d`, or `excel`, `matlab`, `mjd`, `jd`, `labview` for numbers of days or seconds as of these, or `be` for
+    /// dates with years of the Buddhist era.
     #[arg(long, value_name = "FORMAT")]
     pub(crate) time_format: Option<String>,
     /// Zone of times without an offset, as Europe/Berlin or +01:00. Default: they are kept as local times.
@@ -129,6 +133,11 @@ impl DialectOptions {
             strip_units: self.strip_units,
             missing: self
                 .missing
+                .as_deref()
+                .map(fewbits_table::names::split)
+                .unwrap_or_default(),
+            words: self
+                .words
                 .as_deref()
                 .map(fewbits_table::names::split)
                 .unwrap_or_default(),

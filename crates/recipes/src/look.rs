@@ -101,6 +101,8 @@ pub struct LookColumn {
     pub sentinel: Option<f64>,
     /// Cells that have it.
     pub sentinel_cells: u64,
+    /// A cell of digits whose zeros in front are lost, since the column is one of numbers.
+    pub lost_zeros: Option<String>,
 }
 
 /// Looks at a table whose time was chosen, if it has any: reads all rows and counts. `watch` is called as rows are read.
@@ -183,6 +185,7 @@ fn column(column: &Column, profile: &Profile, survey: &Survey, is_time: bool) ->
         first_suspicious: first.map(|(place, cell)| format!("{place}: `{}`", printable(cell))),
         sentinel: sentinel.map(|sentinel| sentinel.value),
         sentinel_cells: sentinel.map_or(0, |sentinel| sentinel.count),
+        lost_zeros: profile.lost_zeros().map(str::to_owned).filter(|_| !is_time),
     }
 }
 

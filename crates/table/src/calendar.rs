@@ -34,8 +34,21 @@ const DAYS: [&str; 7] = [
     "sunday",
 ];
 
-/// Beginnings of the names of months in other languages: German, Dutch, Swedish, French, Spanish, Italian, Portuguese.
-const OTHERS: [(&str, usize); 26] = [
+/// Beginnings of the names of months in other languages: German, Dutch, Swedish, French, Spanish, Italian, Portuguese, Russian.
+const OTHERS: [(&str, usize); 39] = [
+    ("янв", 0),
+    ("фев", 1),
+    ("мар", 2),
+    ("апр", 3),
+    ("май", 4),
+    ("мая", 4),
+    ("июн", 5),
+    ("июл", 6),
+    ("авг", 7),
+    ("сен", 8),
+    ("окт", 9),
+    ("ноя", 10),
+    ("дек", 11),
     ("ene", 0),
     ("gen", 0),
     ("fév", 1),

@@ -1,8 +1,10 @@
 //! Dates and times of day in many spellings: their parts, and what they say of their zone.
 
 pub(crate) use crate::calendar::{NO_SUCH_DATE, Problem, digits};
-use crate::calendar::{checked, day_of_year, is_day_name, month_named, of_week};
+use crate::calendar::{checked, day_of_year, month_named, of_week};
 use crate::time::DECIMALS;
+use crate::worded::{arranged, of_east_asia};
+pub(crate) use crate::worded::{is_ratio, undressed};
 use crate::zones::zone_of;
 pub(crate) use crate::zones::{Zone, offset};
 use jiff::civil::Date;
@@ -33,8 +35,12 @@ pub(crate) struct Written {
 
 /// The parts of a date with or without a time of day.
 pub(crate) fn written(text: &str, order: Order) -> Option<Written> {
-    let text = text.trim();
-    let one = |text: &str| parts(text, order).or_else(|| parts(&arranged(text)?, Order::Ymd));
+    let text = undressed(text);
+    let one = |text: &str| {
+        let worded = || parts(&arranged(text)?, Order::Ymd);
+        let of_east_asia = || parts(&of_east_asia(text)?, Order::Ymd);
+        parts(text, order).or_else(worded).or_else(of_east_asia)
+    };
     let found = one(text);
     if found.as_ref().is_some_and(|found| found.zone != Zone::Unknown) {
         return found;
@@ -53,6 +59,9 @@ pub(crate) fn written(text: &str, order: Order) -> Option<Written> {
 
 fn parts(text: &str, order: Order) -> Option<Written> {
     let (date, rest) = date(text, order)?;
+    // A time of day without marks behind a hyphen, as `20240305-213000`.
+    let is_six = |rest: &&str| rest.len() == 6 && rest.bytes().all(|c| c.is_ascii_digit());
+    let rest = rest.strip_prefix('-').filter(is_six).unwrap_or(rest);
     let rest = rest.trim_start_matches([' ', 'T', 't', '_', ',', '\t', ':']);
     let midnight = (0, 0, false, rest);
     // `2024-03-05-08` may be an hour.
@@ -349,35 +358,4 @@ pub(crate) fn of_digits(text: &str) -> Option<(i64, i128)> {
     let count = text.bytes().take_while(u8::is_ascii_digit).count();
     let (second, parts, leap, rest) = compact_of_day(text).filter(|_| count == 6)?;
     (!leap && second < 86_400 && rest.is_empty()).then_some((second, parts))
-}
-
-/// A date with words, with its parts in the order of ISO 8601: `Tue, 05 Mar 2024 21:30:00 GMT`, `Mar 5, 2024 9:30 PM`.
-fn arranged(text: &str) -> Option<String> {
-    if !text.bytes().any(|c| c.is_ascii_alphabetic()) {
-        return None;
-    }
-    let mut words: Vec<&str> = text.split([' ', ',', '\t']).filter(|word| !word.is_empty()).collect();
-    let has_day = words.first().is_some_and(|word| is_day_name(word));
-    if has_day {
-        words.remove(0);
-    }
-    let Some(at) = words.iter().position(|word| month_named(word).is_some()) else {
-        return has_day.then(|| words.join(" "));
-    };
-    let month = month_named(words.remove(at))? + 1;
-    let is_number = |word: &str, lengths: std::ops::RangeInclusive<usize>| {
-        lengths.contains(&word.len()) && word.bytes().all(|c| c.is_ascii_digit())
-    };
-    let bare = |word: &str| word.trim_end_matches(['.', 's', 't', 'n', 'd', 'r', 'h']).to_owned();
-    if let ([year], false) = (words.as_slice(), has_day)
-        && is_number(year, 4..=4)
-    {
-        // A month alone is that of its first day.
-        return Some(format!("{year}-{month:02}-01"));
-    }
-    let day = words.iter().position(|word| is_number(&bare(word), 1..=2))?;
-    let day = bare(words.remove(day));
-    let year = words.iter().position(|word| is_number(word, 4..=4))?;
-    let year = words.remove(year);
-    Some(format!("{year}-{month:02}-{day:0>2} {}", words.join(" ")))
 }

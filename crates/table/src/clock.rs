@@ -2,16 +2,19 @@
 
 use crate::civil;
 use crate::column::{Column, Kind};
-use crate::days::{by_name, has_date_name, may_be_compact, may_be_days};
+use crate::days::{by_name, has_date_name, may_be_compact};
 use crate::dialect::Dialect;
 use crate::doubts;
 use crate::error::Error;
-use crate::guess::{self, Doubt};
+use crate::guess;
 use crate::interval;
+use crate::known;
 use crate::named::{NAMES, OF_DAY, is_exact_name, is_time_name, starts_an_interval};
-use crate::parts::{Part, calendar, is_hour_and_minute, monthly, of_day_parts, parts, weeks};
+use crate::parts::{calendar, monthly, of_day_parts, parts, weeks};
+use crate::sample::{Refused, dated_hours, majority, with_stated_unit};
+use crate::stated;
 use crate::time::{Scale, Time, Unit};
-use crate::written::{self, Clock, Order, Problem, Syntax};
+use crate::written::{self, Clock, Order, Syntax};
 use std::borrow::Cow;
 
 /// What the cells of a column say of the time.
@@ -81,6 +84,13 @@ pub(crate) fn guess(
     let named = |name: &str| columns.iter().position(|column| column.own_name.to_lowercase() == name);
     if dialect.format.as_deref() == Some("EPW") {
         return Some((0..5).collect());
+    }
+    if dialect.format.as_deref() == Some(known::NETATMO) {
+        // Seconds since 1970 stand beside local times.
+        return columns
+            .iter()
+            .position(|column| column.own_name == "Timestamp")
+            .map(|column| vec![column]);
     }
     let has_named = NAMES.iter().any(|name| named(name).is_some());
     let said: Vec<Says> = columns
@@ -223,18 +233,35 @@ pub(crate) fn clock(
             Some("dmy") => Syntax::Date(Order::Dmy),
             Some("mdy") => Syntax::Date(Order::Mdy),
             Some("ymd" | "iso") => Syntax::Date(Order::Ymd),
+            Some("be") => Syntax::Buddhist,
             Some(format) if written::since(format).is_some() => Syntax::Since(0, 0),
             Some(format) if format.contains('%') => Syntax::Format(format.to_owned()),
             Some(other) => {
                 let expected = "`dmy`, `mdy`, `ymd`, the unit of numbers `s`, `ms`, `us`, `ns`, `min`, `h` or `d`, numbers of days or \
-                                seconds as of `excel`, `matlab`, `mjd`, `jd` or `labview`, or a format as '%d.%m.%Y %H:%M:%S'";
+                                seconds as of `excel`, `matlab`, `mjd`, `jd` or `labview`, `be` for years of the Buddhist era, or a format as '%d.%m.%Y %H:%M:%S'";
                 return Err(Refused::Option(Error::option("--time-format", other, expected)));
             }
-            None => by_name(names, &cells).map_or_else(|| majority(&cells), Ok)?,
+            None => match by_name(names, &cells).map_or_else(|| majority(&cells), Ok) {
+                Ok(Syntax::Date(_)) | Err(Refused::Doubt(_)) if stated::calendar(&cells).is_some() => {
+                    return Err(Refused::Cell(0, stated::calendar(&cells).unwrap_or(written::NO_TIME)));
+                }
+                Err(Refused::Doubt(doubt)) => match stated::order(names) {
+                    Some(order) => Syntax::Date(order),
+                    None => return Err(Refused::Doubt(doubt)),
+                },
+                found => found?,
+            },
         }
     };
     let syntax = with_stated_unit(syntax, names, &cells, dialect);
-    if let Some((syntax, scale)) = dialect.time_format.as_deref().and_then(written::since) {
+    let zero = match (&syntax, &dialect.time_format) {
+        (Syntax::Number(_), None) => stated::zero(names)
+            .transpose()
+            .map_err(|problem| Refused::Cell(0, problem))?,
+        _ => None,
+    };
+    let stated = zero.map(|(unit, zero)| (Syntax::Since(unit, zero), Scale::Utc));
+    if let Some((syntax, scale)) = stated.or_else(|| dialect.time_format.as_deref().and_then(written::since)) {
         return Ok(Clock {
             syntax,
             zone: zone_text
@@ -261,7 +288,7 @@ pub(crate) fn clock(
         _ => false,
     };
     let is_dated = match &syntax {
-        Syntax::Date(_) | Syntax::Parts(..) | Syntax::DateAnd(..) => true,
+        Syntax::Date(_) | Syntax::Parts(..) | Syntax::DateAnd(..) | Syntax::Buddhist => true,
         Syntax::Format(format) => ["%Y", "%y", "%F", "%D", "%s", "%G", "%c"]
             .iter()
             .any(|part| format.contains(part)),
@@ -304,97 +331,4 @@ pub(crate) fn clock(
         marks,
         largest: beyond,
     })
-}
-
-/// Why cells are not taken for times.
-pub(crate) enum Refused {
-    /// An option is not understood.
-    Option(Error),
-    /// The row of the sample, and its problem.
-    Cell(usize, Problem),
-    Doubt(Doubt),
-}
-
-/// How times are written, or the refusal.
-type Found = Result<Syntax, Refused>;
-
-/// Numbers with the unit that the name of their column states. Times since 1970 keep that of their size if the name states seconds.
-fn with_stated_unit(syntax: Syntax, names: &[&str], cells: &[&str], dialect: &mut Dialect) -> Syntax {
-    let ([name], Syntax::Number(_), None) = (names, &syntax, &dialect.time_format) else {
-        return syntax;
-    };
-    let Some((unit, _)) = interval::of_name(name).filter(|(unit, _)| *unit != "s" && !may_be_days(names, cells)) else {
-        return syntax;
-    };
-    dialect.time_format = Some(unit.to_owned());
-    interval::part(unit).map_or_else(|| Syntax::Since(interval::seconds(unit).unwrap_or(1), 0), Syntax::Number)
-}
-
-/// A date in the first column and the hour, and perhaps minute and second, in those behind it.
-fn dated_hours(names: &[&str], sample: &[String], are_hours: Option<bool>, format: Option<&str>) -> Option<Found> {
-    let mut behind = of_day_parts(names.get(1..)?.iter().copied());
-    let is_alone = matches!((behind.as_slice(), names), ([], [_, name]) if !is_hour_and_minute(name));
-    if is_alone && are_hours.is_some() {
-        behind.push(Part::Hour);
-    }
-    // `Heure` may have whole times of day, as `21h30` and `21:30`.
-    let is_of_day = |text: &String| {
-        text.rsplit(' ')
-            .next()
-            .is_some_and(|last| civil::of_day(last).is_some())
-    };
-    if behind.is_empty() || behind.len() + 1 != names.len() || sample.first().is_some_and(is_of_day) {
-        return None;
-    }
-    let date = |text: &String| {
-        let words: Vec<&str> = text.split(' ').collect();
-        words[..words.len().saturating_sub(behind.len())].join(" ")
-    };
-    let dates: Vec<String> = sample.iter().map(date).collect();
-    let dates: Vec<&str> = dates.iter().map(String::as_str).collect();
-    let order = match format {
-        Some("dmy") => Order::Dmy,
-        Some("mdy") => Order::Mdy,
-        Some("ymd" | "iso") => Order::Ymd,
-        Some(_) => return None,
-        None => match majority(&dates) {
-            Ok(Syntax::Date(order)) => order,
-            Ok(_) => return None,
-            Err(refused) => return Some(Err(refused)),
-        },
-    };
-    if is_alone && are_hours == Some(false) {
-        return Some(Err(Refused::Cell(0, written::HOURS)));
-    }
-    Some(Ok(Syntax::DateAnd(order, behind)))
-}
-
-/// How most of the cells are written: a garbled one must not decide.
-fn majority(cells: &[&str]) -> Found {
-    if cells.is_empty() {
-        return Ok(Syntax::Number(Unit::Seconds));
-    }
-    let found = guess::detect(cells).or_else(|| {
-        let good: Vec<&str> = cells
-            .iter()
-            .copied()
-            .filter(|cell| guess::detect(&[cell]).is_some())
-            .collect();
-        (2 * good.len() >= cells.len() && !good.is_empty())
-            .then(|| guess::detect(&good))
-            .flatten()
-    });
-    let is_spelled = |cell: &&str| interval::spelled(cell).is_some() || interval::lettered(cell).is_some();
-    match found {
-        Some(Ok(syntax)) => Ok(syntax),
-        Some(Err(doubt)) => Err(Refused::Doubt(doubt)),
-        None if cells.iter().all(is_spelled) => Ok(Syntax::Spelled),
-        None => {
-            let first = cells
-                .iter()
-                .position(|cell| guess::detect(&[cell]).is_none())
-                .unwrap_or(0);
-            Err(Refused::Cell(first, written::NO_TIME))
-        }
-    }
 }

@@ -2,6 +2,7 @@
 
 use crate::dialect::Delimiter;
 use crate::lines::{Row, Split};
+use crate::{civil, guess};
 
 /// The cells of a line.
 pub(crate) fn cells(line: &str, split: Split) -> Vec<String> {
@@ -35,6 +36,44 @@ pub(crate) fn names_its_rows(lines: &[&str], split: Split) -> bool {
         && others.iter().any(|line| line.bytes().filter(|c| *c == split.quote).count() < 2 * count)
 }
 
+/// A mark that stands in each line as often as in the first, where each line was taken for one cell.
+pub(crate) fn other_mark(lines: &[&str]) -> Option<char> {
+    let [first, others @ ..] = lines else { return None };
+    [':', '#', '/', '!', '@', '&', '*'].into_iter().find(|mark| {
+        let count = first.matches(*mark).count();
+        let is_row = |line: &&str| {
+            let values = line
+                .split(*mark)
+                .filter(|cell| cell.trim().parse::<f64>().is_ok())
+                .count();
+            line.matches(*mark).count() == count && values > 0 && !guess::looks_like_time(line)
+        };
+        count > 0 && !others.is_empty() && others.iter().all(is_row)
+    })
+}
+
+/// Where the date stands in each row, if the names have one cell less since a space stands between date and time of day, or two less since
+/// numbers of rows stand in front.
+pub(crate) fn splits_its_times(lines: &[&str], split: Split) -> Option<usize> {
+    let [first, others @ ..] = lines else { return None };
+    let names = cells(first, split);
+    let count = others.first().map(|line| cells(line, split).len())?;
+    let at = count
+        .checked_sub(names.len() + 1)
+        .filter(|at| *at < 2 && names.len() > 1)?;
+    let is_row = |line: &&str| {
+        let row = cells(line, split);
+        let is_number = |cell: &str| cell.trim_matches('"').bytes().all(|c| c.is_ascii_digit());
+        row.len() == count
+            && row[..at].iter().all(|cell| is_number(cell))
+            && !row[at].contains(':')
+            && guess::looks_like_time(&row[at])
+            && civil::of_day(&row[at + 1]).is_some()
+    };
+    let is_word = |name: &String| name.contains(char::is_alphabetic) && name != "date";
+    (split.delimiter == Delimiter::Spaces && names.iter().all(is_word) && others.iter().all(is_row)).then_some(at)
+}
+
 /// Largest number of titles above names that are aligned by spaces.
 const MAX_TITLES: usize = 5;
 
@@ -45,6 +84,8 @@ pub(crate) fn delimiter(lines: &[&str], quote: u8) -> Delimiter {
         Delimiter::Byte(b';'),
         Delimiter::Byte(b'|'),
         Delimiter::Byte(b','),
+        Delimiter::Byte(b'~'),
+        Delimiter::Byte(b'^'),
     ];
     let later = lines.len() - lines.len() / 2;
     let score = |delimiter: Delimiter| {
@@ -108,7 +149,10 @@ pub(crate) fn delimiter(lines: &[&str], quote: u8) -> Delimiter {
     };
     if count >= 2
         && 10 * found >= 8 * later
-        && (counts.first() == Some(&count) || is_titled() || names_its_rows(lines, spaces))
+        && (counts.first() == Some(&count)
+            || is_titled()
+            || names_its_rows(lines, spaces)
+            || splits_its_times(lines, spaces).is_some())
     {
         return Delimiter::Spaces;
     }

@@ -1,6 +1,6 @@
 //! Detection of a dialect from the first lines of a table.
 
-use crate::delimiter::{cells, delimiter, modal, names_its_rows};
+use crate::delimiter::{cells, delimiter, modal, names_its_rows, splits_its_times};
 use crate::dialect::{Delimiter, Dialect};
 use crate::error::{Error, Place};
 use crate::head::Head;
@@ -61,7 +61,7 @@ pub(crate) fn detect(head: &Head, dialect: &mut Dialect) -> Result<Layout, Error
         .collect();
     let mut is_marked = false;
     if let Some((_, first)) = lines.first()
-        && let Some(delimiter) = first.trim().strip_prefix("sep=")
+        && let Some(delimiter) = first.trim_matches([' ', '"', '\r']).strip_prefix("sep=")
     {
         dialect.delimiter.get_or_insert(delimiter.to_owned());
         // What stands behind it is looked at like any other table, unless the user counted the lines.
@@ -102,6 +102,12 @@ pub(crate) fn detect(head: &Head, dialect: &mut Dialect) -> Result<Layout, Error
     if names_its_rows(&filled, split) {
         // The names of rows have no name.
         rows[0].1.insert(0, String::new());
+    }
+    if let Some(at) = splits_its_times(&filled, split) {
+        // A space stands between date and time of day, which have one name, and perhaps names of rows in front.
+        let names = &mut rows[0].1;
+        (0..at).for_each(|i| names.insert(i, String::new()));
+        names.insert(at, "date".to_owned());
     }
     if let (None, Some(mark @ ('.' | ','))) = (dialect.decimal, dialect.thousands) {
         // One mark does not stand for both.
@@ -278,6 +284,17 @@ fn layout(
                     && (known::are_units(&rows[header].1) || known::are_units_behind(&rows[header].1));
                 dialect.units_row = Some(is_units);
                 header -= usize::from(is_units);
+                // Units above a line of other words, as numbers of sensors, and names above both.
+                let has_words_below = !is_units
+                    && header > 1
+                    && known::are_units(&rows[header - 1].1)
+                    && rows[header - 1].1.len() == rows[header].1.len()
+                    && looks[header - 2].len() == looks[header].len()
+                    && looks[header - 2].iter().all(|look| *look == Look::Text);
+                if has_words_below {
+                    (dialect.units_row, dialect.skip_after_names) = (Some(true), Some(1));
+                    header -= 2;
+                }
             } else {
                 let behind =
                     usize::from(dialect.units_row == Some(true)) + dialect.skip_after_names.unwrap_or(0) as usize;

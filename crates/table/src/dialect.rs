@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::names;
+use crate::profile::Meaning;
 use serde::{Deserialize, Serialize};
 
 /// How a table is written. A field of `None` is detected by [`Table::open`](crate::Table::open); after that, all that matter are set.
@@ -59,11 +60,14 @@ pub struct Dialect {
     /// Spellings of gaps besides the usual ones: `-9999` in all columns, `wind=999` in one.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<String>,
+    /// Columns whose cells are words though they could be numbers or times, as `007`, `1e5`, `1.10`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub words: Vec<String>,
     /// Columns that give the time, one or several.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub time_column: Vec<String>,
     /// How times are written: as of `strftime`, `dmy`, `mdy`, `ymd`, or the unit of numbers: `s`, `ms`, `us`, `ns`, `min`, `h`, `d`; numbers of
-    /// days or seconds of other programs: `excel`, `matlab`, `mjd`, `jd`, `labview`.
+    /// days or seconds of other programs: `excel`, `matlab`, `mjd`, `jd`, `labview`; `be` for dates with years of the Buddhist era.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_format: Option<String>,
     /// Zone of times without an offset: a name, as `Europe/Berlin`, or an offset, as `+01:00`.
@@ -147,6 +151,7 @@ impl Dialect {
             thousands: said.thousands.or(self.thousands),
             strip_units: said.strip_units || self.strip_units,
             missing: list(&said.missing, self.missing),
+            words: list(&said.words, self.words),
             time_column: list(&said.time_column, self.time_column),
             time_format: said.time_format.clone().or(self.time_format),
             time_zone: said.time_zone.clone().or(self.time_zone),
@@ -226,6 +231,7 @@ impl Dialect {
         text("--decimal", self.decimal.map(String::from));
         text("--thousands", self.thousands.map(String::from));
         text("--missing", (!self.missing.is_empty()).then(|| list(&self.missing)));
+        text("--words", (!self.words.is_empty()).then(|| list(&self.words)));
         text("--time-column", (!self.time_column.is_empty()).then(|| list(&self.time_column)));
         text("--time-format", self.time_format.clone());
         text("--time-zone", self.time_zone.clone());
@@ -239,6 +245,18 @@ impl Dialect {
             options.extend(is_said.then(|| flag.to_owned()));
         }
         options.join(" ")
+    }
+
+    /// What is said of the cells of a column, or what its name says of them.
+    pub(crate) fn meaning_of(&self, column: &crate::Column) -> Meaning {
+        let is_it = |name: &String| *name == column.name || *name == column.own_name;
+        if self.words.iter().any(is_it) {
+            Meaning::Words
+        } else if crate::codes::is_named(&column.own_name) {
+            Meaning::Identifiers
+        } else {
+            Meaning::Open
+        }
     }
 
     /// The marks in numbers.

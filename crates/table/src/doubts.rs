@@ -143,7 +143,14 @@ fn is_called(names: &[&str], known: &[&str]) -> bool {
 
 /// Whether a column is named as one of Julian dates and has numbers of their size.
 fn may_be_julian(names: &[&str], cells: &[&str]) -> bool {
-    (is_called(names, &["jd", "bjd", "hjd", "julian"]) && are_within(cells, 2_300_000.0, 2_600_000.0))
+    // Seconds since a start have no quarters alone beyond four weeks.
+    let is_share = |cell: &&str| {
+        cell.parse()
+            .is_ok_and(|x: f64| x.fract() != 0.0 && (2.0 * x).fract() == 0.0)
+    };
+    let is_since_1941 = || are_within(cells, 2_430_000.0, 2_475_000.0) && cells.iter().any(is_share);
+    (is_called(names, &["time", "date"]) && is_since_1941())
+        || (is_called(names, &["jd", "bjd", "hjd", "julian"]) && are_within(cells, 2_300_000.0, 2_600_000.0))
         || (is_called(names, &["mjd"]) && are_within(cells, 15_000.0, 90_000.0))
 }
 

@@ -27,11 +27,12 @@ impl Default for Early {
 }
 
 impl Early {
-    pub(crate) fn add(&mut self, cell: &str) {
-        let Self::Words(texts) = self else { return };
+    /// Adds a text. Returns whether it is kept, or one too many.
+    pub(crate) fn add(&mut self, cell: &str) -> bool {
+        let Self::Words(texts) = self else { return false };
         if texts.last == cell {
             texts.again += 1;
-            return;
+            return false;
         }
         texts.settle();
         cell.clone_into(&mut texts.last);
@@ -39,9 +40,11 @@ impl Early {
             *self = Self::TooMany;
         } else if let Some(count) = texts.counts.get_mut(cell) {
             *count += 1;
+            return false;
         } else {
             texts.counts.insert(cell.to_owned(), 1);
         }
+        true
     }
 }
 
@@ -61,7 +64,7 @@ impl Texts {
         self.counts.into_iter()
     }
 
-    pub(crate) fn texts(&self) -> impl Iterator<Item = &String> {
+    pub(crate) fn texts(&self) -> impl Iterator<Item = &String> + Clone {
         self.counts.keys()
     }
 }

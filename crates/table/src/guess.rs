@@ -31,6 +31,8 @@ impl Doubt {
 
 /// How cells of a column are written, if all are times; an ambiguity if the day or the month may stand first.
 pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Doubt>> {
+    let bare: Vec<&str> = cells.iter().map(|cell| civil::undressed(cell)).collect();
+    let cells = bare.as_slice();
     let clock = |syntax: Syntax, scale| Clock {
         syntax,
         zone: None,
@@ -78,12 +80,9 @@ pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Doubt>> {
             return Some(Err(doubt));
         }
     }
-    let is_worded = cells.iter().all(|cell| {
-        cell.trim()
-            .bytes()
-            .take(7)
-            .any(|c| c.is_ascii_alphabetic() && c != b'T')
-    });
+    let is_worded = cells
+        .iter()
+        .all(|cell| cell.trim().chars().take(7).any(|c| c.is_alphabetic() && c != 'T'));
     match (dmy, mdy) {
         (true, true) if is_dotted || is_worded => Some(Ok(Syntax::Date(Order::Dmy))),
         (true, true) => Some(Err(Doubt::DayOrMonth)),
@@ -123,7 +122,7 @@ pub(crate) fn offset_in(name: &str) -> Option<String> {
 
 /// The three numbers at the beginning of a date with marks between them, and whether each has two digits at most.
 pub(crate) fn three(cell: &str) -> Option<([i64; 3], bool)> {
-    let (first, first_count, rest) = digits(cell.trim(), 4)?;
+    let (first, first_count, rest) = digits(civil::undressed(cell), 4)?;
     let mark = rest.chars().next().filter(|mark| matches!(mark, '/' | '-' | '.'))?;
     let (second, second_count, rest) = digits(&rest[1..], 4)?;
     let (third, third_count, _) = digits(rest.strip_prefix(mark)?, 4)?;
@@ -157,7 +156,7 @@ pub(crate) fn has_offset(text: &str, order: Order) -> bool {
 
 /// Whether a text looks like a time that is no plain number.
 pub(crate) fn looks_like_time(text: &str) -> bool {
-    let text = text.trim();
+    let text = civil::undressed(text);
     // A date has digits, and a year and a month alone may be anything.
     !(text.len() == 7 && text.as_bytes()[4] == b'-')
         && text.bytes().any(|c| c.is_ascii_digit())

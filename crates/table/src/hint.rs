@@ -1,11 +1,16 @@
 //! Texts that are no numbers as they stand: whether they are likely numbers of another spelling, and the option that would read them.
 
+use crate::codes;
+
 /// Marks without ink at the ends of cells, as programs leave them: spaces of several kinds, and the mark of an encoding.
 pub(crate) const BLANKS: [char; 7] = [
     '\u{a0}', '\u{202f}', '\u{2009}', '\u{200b}', '\u{feff}', '\u{b}', '\u{c}',
 ];
 /// Spaces between groups of digits that are no plain ones.
 pub(crate) const SPACES: [char; 3] = ['\u{a0}', '\u{202f}', '\u{2009}'];
+
+/// Marks that stand for a minus.
+pub(crate) const DASHES: [char; 6] = ['\u{2212}', '\u{2013}', '\u{2010}', '\u{2011}', '\u{ff0d}', '\u{fe63}'];
 
 /// The option that the look of a cell suggests.
 pub(crate) fn hint(text: &str) -> &'static str {
@@ -56,6 +61,8 @@ pub(crate) fn hint(text: &str) -> &'static str {
         "say --thousands \"'\""
     } else if text.bytes().all(|c| c.is_ascii_digit() || b"+-.,_".contains(&c)) && text.contains('_') {
         "say --thousands _"
+    } else if codes::is_dotted(text) {
+        "if it is a version or an address, say --words; or leave the column out with --without"
     } else if plain && points > 2 {
         "say --thousands and the mark between groups"
     } else if text.len() > 1 && text.bytes().all(|c| c.is_ascii_hexdigit()) {
@@ -65,7 +72,7 @@ pub(crate) fn hint(text: &str) -> &'static str {
         "if it is an error of a spreadsheet, make it a gap with --missing"
     } else if text.ends_with(FLAGS) {
         "if a mark stands behind the number, --strip-units cuts it off"
-    } else if text.ends_with('%') || text.ends_with(|c: char| c.is_alphabetic()) && !text.contains('x') {
+    } else if text.ends_with(SYMBOLS) || text.ends_with(|c: char| c.is_alphabetic()) && !text.contains('x') {
         "if a unit stands behind the number, say --strip-units"
     } else if text.starts_with("0x") || text.starts_with("0X") {
         "hexadecimal numbers are not read: convert the column, or leave it out with --without"
@@ -79,6 +86,9 @@ fn begins_with_zeros(text: &str) -> bool {
     let digits = text.trim_start_matches(['+', '-']).as_bytes();
     matches!(digits, [b'0', second, ..] if second.is_ascii_digit())
 }
+
+/// Beginnings of units that are no letters: per cent, per mille, degrees, micro, inches, minutes.
+const SYMBOLS: [char; 7] = ['%', '‰', '°', 'µ', '"', '″', '′'];
 
 /// Signs that may stand before a number.
 const CURRENCIES: [char; 4] = ['$', '€', '£', '¥'];
@@ -100,7 +110,8 @@ pub(crate) fn looks_like_number(text: &str) -> bool {
         .unwrap_or(text);
     let size = text
         .trim_matches(BLANKS)
-        .trim_start_matches(['-', '+', '\'', '\u{2212}'])
+        .trim_start_matches(['-', '+', '\''])
+        .trim_start_matches(DASHES)
         .trim_start_matches(CURRENCIES)
         .trim_start_matches(['-', ' ']);
     if !size.starts_with(char::is_numeric) {
@@ -108,6 +119,9 @@ pub(crate) fn looks_like_number(text: &str) -> bool {
     }
     // A minus behind the number, fractions and digits of other scripts too.
     let hexadecimal = size.strip_prefix("0x").or(size.strip_prefix("0X"));
+    if codes::is_dotted(size) {
+        return false;
+    }
     let is_plain = size
         .strip_suffix('-')
         .unwrap_or(size)
@@ -118,7 +132,7 @@ pub(crate) fn looks_like_number(text: &str) -> bool {
         let is_spaced = size.as_bytes().get(number.len()) == Some(&b' ');
         let has_decimals = number.contains(['.', ',']);
         number.replace(',', ".").parse::<f64>().is_ok()
-            && (unit.starts_with(['%', '°', 'µ'])
+            && (unit.starts_with(SYMBOLS)
                 || has_decimals && UNITS.contains(&unit)
                 || unit.chars().all(|c| FLAGS.contains(&c))
                 || (is_spaced && unit.len() <= 6 && !unit.contains(' ')))

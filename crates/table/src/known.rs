@@ -14,6 +14,7 @@ pub(crate) fn needs_more(line: &[u8]) -> bool {
         b"#datatype",
         b"\"Plot Title",
         b" Format ",
+        b"Name;Lat;Long",
     ]
     .iter()
     .any(|begin| line.starts_with(begin))
@@ -87,6 +88,10 @@ pub(crate) fn recognise(lines: &[(u64, String)], dialect: &mut Dialect) {
             dialect.skip = Some(data as u64 + 1);
             dialect.no_header = Some(true);
         }
+    } else if first.starts_with("Name;Lat;Long") {
+        // Netatmo: the names of a station and its values above those of the table.
+        let names = lines.iter().position(|(_, line)| line.starts_with("Timestamp;"));
+        set(NETATMO, names.map(|names| names as u64), false, 0, ";");
     } else if first.starts_with("#group") || first.starts_with("#datatype") {
         set("InfluxDB annotated CSV", Some(0), false, 0, ",");
         dialect.comment.get_or_insert("#".to_owned());
@@ -115,6 +120,8 @@ pub(crate) fn recognise(lines: &[(u64, String)], dialect: &mut Dialect) {
 
 /// Magnetic observatories.
 pub(crate) const IAGA: &str = "IAGA-2002";
+/// Weather stations for homes.
+pub(crate) const NETATMO: &str = "Netatmo";
 /// Oscilloscopes whose settings stand beside the first rows.
 pub(crate) const TEKTRONIX: &str = "Tektronix";
 /// Number of columns of these settings.
@@ -201,7 +208,7 @@ const UNITS: &str = "ts rn smp volt volts v vdc vac mv uv kv amp amps a ma ua w 
     min mins minute minutes h hr hour hours day days m mm cm km um nm ft in inch inches m/s km/h mph kn knots m3 l ml l/s l/min m3/h \
     kg g mg ug t lb pa hpa kpa mpa bar mbar mb psi atm mmhg inhg c k f degc degf deg degrees °c °f °k ℃ ℉ celsius kelvin fahrenheit % \
     percent rh %rh ppm ppb ppt lux lx w/m2 w/m^2 j kj mj n nm db dba dbm ohm ohms kohm mohm s/m us/cm ms/cm ph ntu mg/l ug/m3 µg/m³ \
-    sequence mol mmol umol µmol nmol degt nmi yr mo dy mn µg/m3 rad rpm g0 count counts # unitless none unit utc local va var m^3 m² m³ w/m² µs µm µa mm/h umol/m2/s";
+    sequence mol mmol umol µmol nmol degt nmi yr mo dy mn µg/m3 rad rpm g0 count counts # unitless none unit utc local va var m^3 m² m³ w/m² µs µm µa mm/h umol/m2/s deg_c deg_f inhg";
 
 /// As [`are_units`] of the cells behind the first, if that is no name of a column: a word for the kind of the row, as `DATAU`.
 pub(crate) fn are_units_behind(cells: &[String]) -> bool {
@@ -235,7 +242,7 @@ pub(crate) fn are_units(cells: &[String]) -> bool {
             || is_date_pattern
             || is_known(&lower)
             || (is_compound && factors.all(is_known))
-            || lower == "1"
+            || matches!(lower.as_str(), "1" | "-" | "--")
     };
     // A gap, as `M` or `N.A.`, tells of no units.
     let is_word = |cell: &String| cell != "1" && !missing::is_usual(cell.trim(), true);

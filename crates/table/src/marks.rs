@@ -1,13 +1,13 @@
 //! What points and commas in numbers mean, by the first rows.
 
-use crate::hint::{BLANKS, SPACES, without_unit};
+use crate::hint::{BLANKS, DASHES, SPACES, without_unit};
 
 /// Whether numbers have decimal commas without a doubt: a comma before other than three digits, and no decimal points.
 pub(crate) fn has_decimal_commas(rows: &[(u64, Vec<String>)]) -> bool {
     let (mut certain, mut points) = (false, false);
     for cell in rows.iter().flat_map(|(_, cells)| cells) {
         let cell = cell.trim_matches(BLANKS).trim();
-        let size = without_exponent(cell.trim_start_matches(['-', '+', '\u{2212}']));
+        let size = without_exponent(cell.trim_start_matches(['-', '+']).trim_start_matches(DASHES));
         // A unit behind the number, as in `20,5 °C` and `40,1 %`.
         let size = match without_unit(size) {
             Some((number, unit)) if unit.chars().count() <= 6 && !unit.contains([',', '.', ' ']) => number,
@@ -70,7 +70,7 @@ pub(crate) fn doubtful_groups(rows: &[(u64, Vec<String>)]) -> Option<(u64, &str)
         let (mut first, mut groups, mut hundreds) = (None, 0, 0);
         for (line, cells) in rows {
             let Some(cell) = cells.get(column) else { continue };
-            let size = cell.trim_start_matches(['-', '+', '\u{2212}']);
+            let size = cell.trim_start_matches(['-', '+']).trim_start_matches(DASHES);
             if !size.bytes().all(|c| c.is_ascii_digit() || c == b'.') || size.is_empty() {
                 continue;
             }

@@ -5,11 +5,13 @@ const ALWAYS: [&str; 14] = [
     "", "na", "n/a", "n.a.", "null", "none", "#n/a", "#na", "<na>", "nat", "nil", "nodata", "no data", "\\n",
 ];
 /// Spellings that mean a gap in a column of numbers; in a column of words they are words.
-const AMONG_NUMBERS: [&str; 12] = [
+const AMONG_NUMBERS: [&str; 14] = [
     "?",
     "-",
     "--",
     "---",
+    "–",
+    "—",
     ".",
     "*",
     "m",

@@ -1,6 +1,7 @@
 //! Numbers as loggers write them. What a double cannot hold is refused, never rounded in silence.
 
-use crate::hint::{BLANKS, SPACES, hint};
+use crate::codes;
+use crate::hint::{BLANKS, DASHES, SPACES, hint};
 use std::borrow::Cow;
 
 /// How numbers are written.
@@ -139,7 +140,8 @@ fn slowly(text: &[u8], syntax: Syntax) -> Result<Number, Fault> {
         return Err(Fault::NoNumber);
     }
     let text = std::str::from_utf8(text).map_err(|_| Fault::NoNumber)?;
-    let mut plain: String = text.trim_matches(BLANKS).replace('\u{2212}', "-");
+    let text = formula(text.trim_matches(BLANKS)).ok_or(Fault::NoNumber)?;
+    let mut plain: String = text.replace(DASHES, "-");
     if syntax.thousands == Some(b' ') {
         plain = plain.replace(SPACES, " ");
     }
@@ -194,6 +196,12 @@ fn slowly(text: &[u8], syntax: Syntax) -> Result<Number, Fault> {
         Some(exact) => i64::try_from(exact).map(Number::Whole).map_err(|_| Fault::TooLong),
         None => Err(Fault::TooLong),
     }
+}
+
+/// A text without the marks of `="0.5"`, as which spreadsheets keep texts of digits; `None` if zeros in front say that it is no number.
+fn formula(text: &str) -> Option<&str> {
+    let inner = text.strip_prefix("=\"").and_then(|text| text.strip_suffix('"'));
+    inner.map_or(Some(text), |inner| Some(inner).filter(|inner| !codes::is_padded(inner)))
 }
 
 /// A number with an exponent as of Fortran, `1.95D+01`, with that of others.

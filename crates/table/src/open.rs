@@ -1,9 +1,11 @@
 //! Opening a table: from bytes to rows with a known dialect.
 
 use crate::column::Column;
+use crate::delimiter::other_mark;
 use crate::detect::{self, Layout};
 use crate::dialect::{Delimiter, Dialect};
 use crate::error::{Error, Place};
+use crate::framed::{self, Framed};
 use crate::head::{self, Head};
 use crate::json::{self, Keys, Pairs};
 use crate::lines::{Lines, Row, Split};
@@ -11,7 +13,7 @@ use crate::profile::Profile;
 use crate::rows::Rows;
 use crate::table::Table;
 use crate::{influx, known, labelled, logs, names, source};
-use std::io::{BufRead, Cursor, Read};
+use std::io::{BufRead, BufReader, Cursor, Read};
 
 impl Table {
     /// Opens a table of text: CSV and its relatives, or lines of JSON; plain, or packed if the features `gzip` and `zstd` are on. What
@@ -24,7 +26,16 @@ impl Table {
         let mut dialect = said.clone().checked()?;
         let (mut reader, encoding) = source::text(Box::new(source), said.encoding.as_deref())?;
         dialect.encoding = dialect.encoding.or(encoding);
-        let head = Head::read(&mut *reader)?;
+        let mut head = Head::read(&mut *reader)?;
+        if let Some(frame) = framed::find(&head, said) {
+            dialect.format.get_or_insert(frame.format().to_owned());
+            if let Some(mark) = frame.delimiter() {
+                dialect.delimiter.get_or_insert(mark.to_owned());
+            }
+            let framed = Framed::new(&head.bytes, reader, frame);
+            reader = Box::new(BufReader::with_capacity(head::MAX_BYTES, framed));
+            head = Head::read(&mut *reader)?;
+        }
         if head.lines.is_empty() && head.bytes.len() >= head::MAX_BYTES {
             return Err(Error::Line {
                 place: Place { line: 1, row: 0 },
@@ -34,6 +45,12 @@ impl Table {
         }
         let first = head.bytes.iter().copied().find(|c| !c.is_ascii_whitespace());
         let is_object = first == Some(b'{') && said.delimiter.is_none();
+        if head.bytes.windows(2).any(|pair| pair == b"\x1b[") {
+            return Err(Error::Format {
+                what: "text with colours of a terminal",
+                mend: "take them out: sed 's/\\x1b\\[[0-9;]*[A-Za-z]//g' FILE | fewbits ... -",
+            });
+        }
         if first == Some(b'[') && head.bytes.contains(&b'{') {
             return Err(Error::Format {
                 what: "JSON, a list",
@@ -123,6 +140,12 @@ fn of_keys(
         if !keys.contains(&key) {
             keys.push(key);
         }
+    }
+    if keys.is_empty() {
+        return Err(Error::Format {
+            what: "JSON without a value",
+            mend: "give objects of values, one a line",
+        });
     }
     dialect.format = Some(format.to_owned());
     dialect.decimal.get_or_insert('.');
@@ -235,6 +258,33 @@ fn of_text(
             mend: "say how they are written, as --encoding latin1, windows-1251, shift_jis or gbk",
         });
     }
+    if own_names
+        .iter()
+        .any(|name| name.contains(['\u{85}', '\u{2028}', '\u{2029}']))
+    {
+        return Err(Error::Line {
+            place: Place {
+                line: first_line.saturating_sub(1).max(1),
+                row: 0,
+            },
+            problem: "lines end with U+0085, U+2028 or U+2029".to_owned(),
+            mend: "write ends of lines: perl -CSD -pe 's/[\\x{85}\\x{2028}\\x{2029}]/\\n/g' FILE | fewbits ... -",
+        });
+    }
+    let lines: Vec<&str> = head.filled_lines().collect();
+    if own_names.len() == 1
+        && said.delimiter.is_none()
+        && let Some(mark) = other_mark(&lines)
+    {
+        return Err(Error::Line {
+            place: Place {
+                line: first_line.saturating_sub(1).max(1),
+                row: 0,
+            },
+            problem: format!("one column, and `{mark}` stands as often in each line as in that of the names"),
+            mend: "name what separates cells with --delimiter; or say --delimiter , if this is one column",
+        });
+    }
     rows.header.clone_from(&own_names);
     let columns = named(&own_names, &units);
     Ok((rows, columns))
@@ -262,6 +312,9 @@ fn first_profiles(head: &Head, rows: &Rows, columns: &[Column], dialect: &Dialec
         .iter()
         .map(|column| dialect.missing_of(&column.name, &column.own_name))
         .collect();
+    for (profile, column) in profiles.iter_mut().zip(columns) {
+        profile.meaning = dialect.meaning_of(column);
+    }
     let from = rows.lines.line();
     let whole = head.lines.iter().filter(|(number, _)| *number > from);
     let text = whole
@@ -280,7 +333,9 @@ fn first_profiles(head: &Head, rows: &Rows, columns: &[Column], dialect: &Dialec
     loop {
         match first.next(&mut row) {
             Ok(None) => break,
-            Ok(Some(())) if row.cells.len() >= columns.len() && !first.is_header_again(&row) => {
+            Ok(Some(()))
+                if (row.cells.len() >= columns.len() || dialect.short_rows) && !first.is_header_again(&row) =>
+            {
                 let place = Place {
                     line: from + row.line,
                     row: 0,

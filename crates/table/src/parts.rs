@@ -91,9 +91,19 @@ pub(crate) fn weeks(columns: &[Column]) -> Option<Vec<usize>> {
 /// The part of a date that a name means, behind the parts of other columns.
 fn part(name: &str, before: &[Part]) -> Option<Part> {
     const MEANINGS: [(Part, &[&str]); 8] = [
-        (Part::Year, &["year", "yyyy", "yr", "yy", "#yy", "jahr"]),
-        (Part::Month, &["month", "mm", "mo", "mon", "monat"]),
-        (Part::Day, &["day", "dd", "dy", "tag"]),
+        (
+            Part::Year,
+            &[
+                "year", "yyyy", "yr", "yy", "#yy", "jahr", "année", "annee", "année", "año", "anno", "jaar", "ano",
+            ],
+        ),
+        (
+            Part::Month,
+            &[
+                "month", "mm", "mo", "mon", "monat", "mois", "mes", "mese", "maand", "mês",
+            ],
+        ),
+        (Part::Day, &["day", "dd", "dy", "tag", "jour", "día", "dia", "giorno", "dag"]),
         (Part::Hour, &["hour", "hh", "hr", "stunde", "heure", "hora"]),
         (Part::Minute, &["minute", "min", "mi", "mn"]),
         (Part::Second, &["second", "sec", "ss", "seconds"]),
@@ -116,9 +126,16 @@ pub(crate) fn is_hour_and_minute(name: &str) -> bool {
 
 /// Columns side by side that give a date by their names, from the year on.
 pub(crate) fn calendar(columns: &[Column]) -> Option<Vec<usize>> {
-    let first = columns
-        .iter()
-        .position(|column| part(&column.own_name, &[]) == Some(Part::Year))?;
+    let is = |i: usize, expected: Part| {
+        let column = columns.get(i);
+        column.is_some_and(|column| part(&column.own_name, &[]) == Some(expected))
+    };
+    // Day, month and year, in this order or that of America, side by side.
+    let ends_with_year = |i: usize| {
+        is(i + 2, Part::Year)
+            && ((is(i, Part::Day) && is(i + 1, Part::Month)) || (is(i, Part::Month) && is(i + 1, Part::Day)))
+    };
+    let first = (0..columns.len()).find(|i| is(*i, Part::Year) || ends_with_year(*i))?;
     let mut found = Vec::new();
     for column in &columns[first..] {
         let Some(part) = part(&column.own_name, &found) else {
@@ -294,6 +311,17 @@ pub(crate) fn parts_of_second(cell: &str, decimals: u8) -> Option<i128> {
     let count = cell.trim().parse::<u32>().ok().map(i128::from)?;
     let unit = SECOND / 10_i128.pow(u32::from(decimals));
     Some(count * unit).filter(|parts| *parts < SECOND)
+}
+
+/// The column behind those of the time, if it says which half of the day their hours are of.
+pub(crate) fn half_behind(samples: &[&[String]], time: &[usize]) -> Option<usize> {
+    let last = *time.last()?;
+    let cells = samples.get(last + 1)?;
+    let is_half = |cell: &String| {
+        let word = cell.replace(['.', ' '], "").to_ascii_lowercase();
+        matches!(word.as_str(), "am" | "pm")
+    };
+    (!cells.is_empty() && cells.iter().all(is_half)).then_some(last + 1)
 }
 
 /// The column behind those of the time, if it counts parts of their seconds: by both names, as `stamp.sec, stamp.nanosec`, or since it

@@ -1,5 +1,6 @@
 //! What the cells of a column are, counted over rows: its kind, its range, its gaps by spelling, and what looks wrong.
 
+use crate::codes;
 use crate::column::{Kind, MAX_WORDS};
 use crate::early::Early;
 use crate::ends::{self, End, Sentinel};
@@ -13,6 +14,7 @@ use crate::quick;
 use crate::seen::{Class, Seen, is_candidate};
 use std::collections::BTreeMap;
 
+mod kind;
 #[cfg(feature = "parquet")]
 mod typed;
 
@@ -61,6 +63,21 @@ pub struct Profile {
     pub first_text: Option<(Place, String)>,
     pub(crate) sample: Vec<String>,
     seen: Seen,
+    /// What is said of its cells, or what its name says of them.
+    pub(crate) meaning: Meaning,
+    /// The first cell of digits with zeros in front.
+    padded: Option<String>,
+}
+
+/// What is known of the cells of a column beside themselves.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) enum Meaning {
+    #[default]
+    Open,
+    /// Its name says that they are identifiers.
+    Identifiers,
+    /// The user says that they are words.
+    Words,
 }
 
 /// Words of booleans.
@@ -85,10 +102,25 @@ impl Profile {
         vec![profile; columns]
     }
 
+    /// Adds a cell of a column of which the user says that it has words.
+    fn add_word(&mut self, cell: &str, gaps: &Spellings) {
+        if missing::is_usual(cell, false) || gaps.has_text(cell) {
+            self.gap(cell);
+            return;
+        }
+        self.keep(cell);
+        self.texts += 1;
+        self.word(cell);
+    }
+
     /// Adds a trimmed cell.
     pub(crate) fn add(&mut self, cell: &str, place: Place, syntax: number::Syntax, gaps: &Spellings, strips: bool) {
         if cell.is_empty() {
             self.gap(cell);
+            return;
+        }
+        if self.meaning == Meaning::Words {
+            self.add_word(cell, gaps);
             return;
         }
         let is_candidate = is_candidate(cell);
@@ -155,6 +187,10 @@ impl Profile {
             return;
         }
         let cell = std::str::from_utf8(cell).unwrap_or_default();
+        if self.meaning == Meaning::Words {
+            self.add_word(cell, gaps);
+            return;
+        }
         if !gaps.is_empty() && gaps.has_text(cell) {
             self.gap(cell);
             return;
@@ -169,8 +205,12 @@ impl Profile {
 
     /// Adds a cell of ASCII that is a time in a usual spelling.
     pub(crate) fn add_written_time(&mut self, cell: &[u8], gaps: &Spellings) {
-        if self.sample.len() < SAMPLE || !gaps.is_empty() {
+        if self.sample.len() < SAMPLE || !gaps.is_empty() || self.meaning == Meaning::Words {
             let text = std::str::from_utf8(cell).unwrap_or_default();
+            if self.meaning == Meaning::Words {
+                self.add_word(text, gaps);
+                return;
+            }
             if gaps.has_text(text) {
                 self.gap(text);
                 return;
@@ -218,8 +258,8 @@ impl Profile {
         // Numbers may be words among words: `A1`, `7`, `B2`.
         if self.texts > 0 {
             self.word(cell);
-        } else {
-            self.early.add(cell);
+        } else if self.early.add(cell) && self.padded.is_none() && codes::is_padded(cell) {
+            self.padded = Some(cell.to_owned());
         }
     }
 
@@ -285,50 +325,6 @@ impl Profile {
         }
     }
 
-    /// The kind of the column.
-    pub fn kind(&self) -> Kind {
-        let numbers = self.numbers + self.integers + self.faults;
-        let words = self.texts + self.booleans;
-        if numbers >= words.max(self.times).max(1) {
-            // Few words among numbers are faults, not words of an enumeration.
-            return if self.integers > 0 && self.fractions == 0 {
-                Kind::Integer
-            } else {
-                Kind::Number
-            };
-        }
-        if self.times > 0 && self.times >= words {
-            Kind::Time
-        } else if words == 0 {
-            Kind::Number
-        } else if self.texts == 0 && (numbers == 0 || matches!(self.early, Early::TooMany)) {
-            // Many different numbers are no words: they are faults among booleans.
-            Kind::Boolean
-        } else if self.words.len() <= MAX_WORDS && self.times == 0 && !self.has_too_many {
-            Kind::Words
-        } else {
-            Kind::Text
-        }
-    }
-
-    /// The words of a column of words, in the order of their letters; the usual words for a gap among numbers are words here.
-    pub(crate) fn all_words(&self, gaps: &Spellings) -> Vec<String> {
-        let usual = self
-            .missing
-            .keys()
-            .filter(|word| !missing::is_usual(word, false) && !gaps.has_text(word));
-        let early = match &self.early {
-            Early::Words(words) => Some(words.texts()),
-            Early::TooMany => None,
-        };
-        let early = early.into_iter().flatten();
-        let mut words: Vec<String> = self.words.keys().chain(usual).chain(early).cloned().collect();
-        words.sort_unstable();
-        words.dedup();
-        words.truncate(MAX_WORDS);
-        words
-    }
-
     /// Number of cells that are no gaps.
     pub fn values(&self) -> u64 {
         self.numbers + self.integers + self.booleans + self.times + self.texts + self.faults
@@ -348,16 +344,6 @@ impl Profile {
     /// Number of gaps.
     pub fn gaps(&self) -> u64 {
         self.missing.values().sum()
-    }
-
-    /// Cells that are neither gaps nor of the column's kind.
-    pub fn suspicious(&self) -> u64 {
-        match self.kind() {
-            Kind::Number | Kind::Integer => self.faults + self.texts + self.booleans + self.times,
-            Kind::Boolean => self.faults + self.numbers + self.integers + self.times,
-            Kind::Time => self.faults + self.texts + self.booleans + self.numbers + self.integers,
-            _ => 0,
-        }
     }
 
     /// Smallest and largest number of a column of [`Kind::Integer`], which doubles may not hold.

@@ -2,6 +2,7 @@
 
 use crate::cell::{Meaning, push_cell};
 use crate::column::{Batch, Cells, Kind};
+use crate::dialect::Delimiter;
 use crate::error::{Error, Place, printable};
 use crate::guess::looks_like_time;
 use crate::missing;
@@ -11,6 +12,8 @@ use crate::table::Table;
 
 /// Largest number of lines that were left out and whose faults are kept.
 const MAX_FAULTS: usize = 10;
+/// Several curves in one file.
+const BLOCK: &str = "a further block of rows begins here, behind two blank lines";
 
 impl Table {
     /// Reads at most `limit` rows into `batch`. Returns how many there were; 0 after the last. Of a live source, a call with a limit of 1
@@ -60,7 +63,8 @@ impl Table {
                     mend: "make a file of its own of this line and all behind it",
                 };
             }
-            let is_other = is_of_row && !is_moved && self.rows.begins_another_table(&self.row);
+            let is_block = matches!(&error, Error::Line { problem, .. } if problem == BLOCK);
+            let is_other = is_of_row && !is_moved && !is_block && self.rows.begins_another_table(&self.row);
             if is_other {
                 error = Error::Line {
                     place: self.own_place(self.place()),
@@ -70,7 +74,7 @@ impl Table {
             }
             if is_of_row && self.rows.is_preamble(&self.row) {
                 self.skipped.repeated += 1;
-            } else if is_of_row && !is_moved && !is_other && self.skipped.bad < self.dialect.skip_bad {
+            } else if is_of_row && !is_moved && !is_other && !is_block && self.skipped.bad < self.dialect.skip_bad {
                 self.skip(&error);
             } else if batch.rows > 0 {
                 self.late_error = Some(error);
@@ -205,6 +209,9 @@ impl Table {
 
     /// Reads the next row that is not blank into `self.row`.
     fn next_row(&mut self) -> Result<bool, Error> {
+        // Blocks of rows behind two blank lines, as of gnuplot, are several curves.
+        let has_blocks = self.rows.split.delimiter == Delimiter::Spaces && self.rows.keys.is_none();
+        let mut blanks = 0;
         loop {
             self.row.text.clear();
             self.row.cells.clear();
@@ -220,6 +227,7 @@ impl Table {
                 && (self.columns.len() > 1 || self.time.is_some())
             {
                 self.count -= 1;
+                blanks += 1;
                 self.skipped.blank += u64::from(self.row.cells.len() > 1);
                 continue;
             }
@@ -227,6 +235,22 @@ impl Table {
                 self.count -= 1;
                 self.skipped.repeated += 1;
                 continue;
+            }
+            if has_blocks {
+                let next = self.row.cell_text(0).parse::<f64>().ok();
+                let before = std::mem::replace(&mut self.first_number, next);
+                let goes_back = before.zip(next).is_some_and(|(before, next)| next < before);
+                if blanks < 2 || !goes_back {
+                    return Ok(true);
+                }
+                return Err(Error::Line {
+                    place: Place {
+                        line: self.row.line,
+                        row: 0,
+                    },
+                    problem: BLOCK.to_owned(),
+                    mend: "make a file of each block, as: awk 'BEGIN {RS = \"\\n\\n\\n+\"} NR == 1' FILE | fewbits ... -",
+                });
             }
             return Ok(true);
         }
@@ -336,7 +360,9 @@ impl Table {
             .iter()
             .filter(is_other)
             .map(|i| printable(&self.columns[*i].name));
+        let own = names::as_argument([printable(&self.columns[column].name)]);
         let mend = mend.replace("--without", &format!("--without {}", names::as_argument(names)));
+        let mend = mend.replace("--words", &format!("--words {own}"));
         self.refused(column, cell, problem, mend)
     }
 

@@ -13,12 +13,19 @@ use std::io::Cursor;
 /// The mark of UTF-8.
 const MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Whether a line is the number of rows that programs of databases write below them, as `(60 rows)`.
+/// Whether a line is the number of rows that programs of databases write below them, as `(60 rows)` and `60 rows in set (0.01 sec)`.
 fn is_row_count(text: &[u8]) -> bool {
-    let number = text
-        .strip_prefix(b"(")
-        .and_then(|text| text.strip_suffix(b" rows)").or(text.strip_suffix(b" row)")));
-    number.is_some_and(|number| !number.is_empty() && number.iter().all(u8::is_ascii_digit))
+    let bare = text.strip_prefix(b"(").unwrap_or(text);
+    let digits = bare.iter().take_while(|c| c.is_ascii_digit()).count();
+    if digits == 0 {
+        return false;
+    }
+    let rest = &bare[digits..];
+    let rest = rest.strip_prefix(b" rows").or(rest.strip_prefix(b" row"));
+    rest.is_some_and(|rest| match bare.len() < text.len() {
+        true => rest == b")",
+        false => rest.starts_with(b" in set"),
+    })
 }
 
 /// Rows of a text.
@@ -168,6 +175,21 @@ impl Rows {
             || (columns == 1 && count == 0);
         if is_good {
             return Ok(());
+        }
+        let is_time = |i: &usize| {
+            let (front, behind) = (row.cell(*i), row.cell(*i + 1));
+            let is_digits = |text: &[u8]| !text.is_empty() && text.iter().all(u8::is_ascii_digit);
+            let seconds = front.len().checked_sub(3).map(|at| &front[at..]);
+            seconds.is_some_and(|end| end[0] == b':' && is_digits(&end[1..]))
+                && behind.len() % 3 == 0
+                && is_digits(behind)
+        };
+        if count == columns + 1 && (0..columns).any(|i| is_time(&i)) {
+            return Err(Error::Line {
+                place: Place { line: row.line, row: 0 },
+                problem: format!("{count} cells instead of {columns}, and a comma behind seconds"),
+                mend: "write a point before their decimals: sed -E 's/(:[0-9]{2}),([0-9]{3})/\\1.\\2/' FILE | fewbits ... -",
+            });
         }
         let s = if count == 1 { "" } else { "s" };
         Err(Error::Line {

@@ -33,6 +33,9 @@ impl Table {
             columns: Profile::of_columns(self.columns.len()),
             ..Survey::default()
         };
+        for (profile, column) in survey.columns.iter_mut().zip(&self.columns) {
+            profile.meaning = self.dialect.meaning_of(column);
+        }
         let mut batch = Batch::default();
         self.selected.clear();
         loop {

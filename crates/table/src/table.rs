@@ -10,7 +10,7 @@ use crate::missing::Spellings;
 use crate::names;
 use crate::number;
 use crate::plain::Scanner;
-use crate::profile::Profile;
+use crate::profile::{Meaning, Profile};
 use crate::rows::Rows;
 use crate::survey::Survey;
 use crate::words::Words;
@@ -44,6 +44,8 @@ pub struct Table {
     /// What splits plain lines, if the table may have some.
     pub(crate) scanner: Option<Scanner>,
     pub(crate) count: u64,
+    /// The first cell of the last row, if it is a number and rows may stand in blocks.
+    pub(crate) first_number: Option<f64>,
     pub(crate) skipped: Skipped,
     /// An error that came behind rows that were handed out first.
     pub(crate) late_error: Option<Error>,
@@ -96,6 +98,7 @@ impl Table {
             own_dialect: None,
             row: Row::default(),
             count: 0,
+            first_number: None,
             skipped: Skipped::default(),
             late_error: None,
             profiles,
@@ -105,6 +108,9 @@ impl Table {
             if let Some((name, _)) = word.rsplit_once('=').filter(|(name, _)| *name != "*") {
                 table.position(&names::unquoted(name.trim()))?;
             }
+        }
+        for name in &table.dialect.words {
+            table.position(name)?;
         }
         let kinds: Vec<Kind> = table.profiles.iter().map(Profile::kind).collect();
         table.set_kinds(&kinds);
@@ -278,11 +284,20 @@ impl Table {
         Ok(())
     }
 
-    /// Whether the first lines have numbers in every selected column, and nothing else: then nothing is learned by a
-    /// [`survey`](Self::survey) of their kinds.
+    /// Whether the first lines have numbers in every selected column, and nothing else, and no name says that they are identifiers: then
+    /// nothing is learned by a [`survey`](Self::survey) of their kinds.
     pub fn is_plain(&self) -> bool {
         let mut selected = self.selected.iter();
-        selected.all(|i| self.columns[*i].kind == Kind::Number && self.profiles[*i].numbers > 0)
+        selected.all(|i| {
+            let profile = &self.profiles[*i];
+            self.columns[*i].kind == Kind::Number && profile.numbers > 0 && profile.meaning == Meaning::Open
+        })
+    }
+
+    /// The selected columns of numbers whose digits have zeros in front in the first rows, which are lost, and a cell of each.
+    pub fn lost_zeros(&self) -> Vec<(&Column, &str)> {
+        let of = |i: &usize| Some((self.columns.get(*i)?, self.profiles.get(*i)?.lost_zeros()?));
+        self.selected.iter().filter_map(of).collect()
     }
 
     /// Keeps the text of a column for [`label`](Self::label), as the names of what rows report; it is then no column of values.

@@ -1,11 +1,13 @@
 //! Which columns of a table give the time.
 
-use crate::clock::{self, Refused};
+use crate::clock;
+use crate::column::Kind;
 use crate::error::{Error, Place, printable};
 use crate::guess;
 use crate::interval;
 use crate::names;
 use crate::parts;
+use crate::sample::Refused;
 use crate::table::Table;
 use crate::time::Scale;
 #[cfg(feature = "parquet")]
@@ -60,6 +62,10 @@ impl Table {
                     }
                     return Err(error);
                 }
+                if let Some(twin) = self.twin(&columns) {
+                    return Err(twin);
+                }
+                columns.extend(parts::half_behind(&samples, &columns));
                 columns.extend(parts::parts_behind(&self.columns, &samples, &columns));
                 self.set_time_columns(columns).map(|()| true)
             }
@@ -68,6 +74,37 @@ impl Table {
                 None => Ok(false),
             },
         }
+    }
+
+    /// The refusal of two tables side by side that have times of their own, which differ.
+    fn twin(&self, time: &[usize]) -> Option<Error> {
+        let [time] = time else { return None };
+        let (own, sample) = (&self.columns[*time], &self.profiles[*time].sample);
+        let increases = |cells: &[String]| {
+            let numbers: Vec<f64> = cells.iter().filter_map(|cell| cell.parse().ok()).collect();
+            numbers.len() == cells.len() && numbers.len() > 1 && numbers.is_sorted_by(|a, b| a < b)
+        };
+        let is_gap = |i: usize| self.columns[i].own_name.is_empty() && self.profiles[i].values() == 0;
+        let is_twin = |i: &usize| {
+            let (column, other) = (&self.columns[*i], &self.profiles[*i].sample);
+            let is_named = column.own_name.eq_ignore_ascii_case(&own.own_name);
+            column.kind == own.kind
+                && ((is_named && !own.own_name.is_empty()) || (column.kind == Kind::Time && (*time..*i).any(is_gap)))
+                && other.iter().zip(sample).any(|(a, b)| a != b)
+                && (column.kind == Kind::Time || increases(other))
+        };
+        let twin = (time + 1..self.columns.len()).find(is_twin)?;
+        let name = |i: usize| names::quoted(&printable(&self.columns[i].name));
+        let problem = "is the time of one of two tables that stand side by side, and the other has other times";
+        let mut error = self.time_refused(&[*time], sample, Refused::Cell(0, (problem, "")));
+        if let Error::Cell { mend, .. } = &mut error {
+            *mend = format!(
+                "make a table of each, as: cut -d, -f1-{} FILE | fewbits ... -; or say --time-column {}, and --columns for those of that time",
+                twin,
+                name(*time)
+            );
+        }
+        Some(error)
     }
 
     /// As [`find_time`](Self::find_time), or takes the first column if its numbers increase.

@@ -7,6 +7,7 @@ use crate::interval;
 use crate::number;
 use crate::parts::{Part, joined, padded, parts_of_second};
 use crate::quick;
+use crate::stated;
 use crate::time::{DECIMALS, SECOND, Scale, Time, Unit};
 use jiff::civil::{Date, DateTime};
 use jiff::tz::{Offset, TimeZone};
@@ -26,6 +27,8 @@ pub(crate) enum Syntax {
     Spelled,
     /// Units of so many seconds since a zero, in seconds since 1970.
     Since(i64, i64),
+    /// A date with a year of the Buddhist era.
+    Buddhist,
     Format(String),
 }
 
@@ -168,8 +171,12 @@ impl Clock {
     }
 
     fn slowly(&self, text: &str) -> Result<Time, Problem> {
-        let text = text.trim();
+        let text = civil::undressed(text);
         match &self.syntax {
+            Syntax::Buddhist => {
+                let (text, order) = stated::of_common_era(text).ok_or(NO_TIME)?;
+                self.written(&text, order)
+            }
             Syntax::Number(unit) => match self.number(text, *unit)? {
                 time if time > self.largest => Err(BEYOND),
                 time => Ok(time),
@@ -184,7 +191,7 @@ impl Clock {
                     return Ok(Time::checked(second, fraction));
                 }
                 let (second, fraction, leap, rest) = civil::of_day(text).ok_or(NO_TIME)?;
-                if leap || !rest.trim().is_empty() {
+                if civil::is_ratio(text) || leap || !rest.trim().is_empty() {
                     return Err(NO_TIME);
                 }
                 Ok(Time::checked(second, fraction))

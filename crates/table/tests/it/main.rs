@@ -3,9 +3,11 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod again;
+mod codes;
 mod dialects;
 mod doubts;
 mod faults;
+mod frames;
 mod fresh;
 mod kinds;
 mod layouts;
@@ -19,6 +21,7 @@ mod random;
 mod recordings;
 mod refused;
 mod spellings;
+mod stated;
 mod strangers;
 mod times;
 mod unseen;
