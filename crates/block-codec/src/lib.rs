@@ -136,10 +136,3 @@ impl BlockCodec {
         self.delta == 0.0
     }
 }
-
-fn check_rows(rows: usize, others: &[&[f64]]) -> Result<(), ArgumentError> {
-    match others.iter().find(|other| other.len() != rows) {
-        Some(other) => Err(ArgumentError::new("others", other.len(), format!("{rows} rows"))),
-        None => Ok(()),
-    }
-}
