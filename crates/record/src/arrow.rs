@@ -21,7 +21,6 @@ use arrow_array::types::{
 use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, RecordBatch, make_array};
 use arrow_schema::{DataType, Field, TimeUnit};
 use fewbits_block_codec::ArgumentError;
-use std::collections::HashMap;
 use std::io::Write;
 use std::sync::Arc;
 
@@ -61,26 +60,25 @@ fn retyped(array: &dyn Array, kind: DataType) -> Result<ArrayRef, Error> {
 impl Schema {
     /// The fields of batches of this recording. Units, and the decimals of ticks, are in the metadata.
     pub fn to_arrow(&self) -> arrow_schema::Schema {
+        let field = |name: &str, kind, is_nullable, metadata: Option<(&str, String)>| {
+            let metadata = metadata.into_iter().map(|(key, value)| (key.to_owned(), value));
+            Field::new(name, kind, is_nullable).with_metadata(metadata.collect())
+        };
         let kind = type_of(self.time);
         let time = match self.time {
-            TimeBase::Numbered => Field::new("row", kind, false),
-            TimeBase::Clock { decimals, .. } if kind == DataType::Int64 => {
-                let decimals = HashMap::from([("decimals".to_owned(), decimals.to_string())]);
-                Field::new("time", kind, false).with_metadata(decimals)
+            TimeBase::Numbered => field("row", kind, false, None),
+            TimeBase::Clock { decimals, .. } => {
+                let ticks = (kind == DataType::Int64).then(|| ("decimals", decimals.to_string()));
+                field("time", kind, false, ticks)
             }
-            TimeBase::Clock { .. } => Field::new("time", kind, false),
         };
         let columns = self.columns.iter().map(|column| {
             let kind = match column.integers {
                 None => DataType::Float64,
                 Some(_) => DataType::Int64,
             };
-            let field = Field::new(&column.name, kind, true);
-            if column.unit().is_empty() {
-                field
-            } else {
-                field.with_metadata(HashMap::from([("unit".to_owned(), column.unit().to_owned())]))
-            }
+            let unit = (!column.unit.is_empty()).then(|| ("unit", column.unit.clone()));
+            field(&column.name, kind, true, unit)
         });
         arrow_schema::Schema::new(std::iter::once(time).chain(columns).collect::<Vec<_>>())
     }
@@ -93,10 +91,8 @@ impl Block {
     /// If the block is not of a recording with this schema.
     pub fn to_record_batch(&self, schema: &Schema) -> Result<RecordBatch, Error> {
         let fields = schema.to_arrow();
-        if self.columns.len() != schema.columns.len() {
-            let given = format!("{} columns", self.columns.len());
-            return Err(ArgumentError::new("schema", given, format!("{}", schema.columns.len())).into());
-        }
+        let (given, wanted) = (self.columns.len(), schema.columns.len());
+        ensure!(given == wanted, "schema", format!("{given} columns"), format!("{wanted}"));
         let ticks = Int64Array::from_iter_values(self.ticks.iter().copied());
         let time = retyped(&ticks, type_of(schema.time))?;
         let asked = (0..self.columns.len()).filter(|i| self.columns[*i].len() == self.rows());
@@ -123,15 +119,9 @@ fn array(cells: &[Option<f64>], integers: Option<Integers>) -> ArrayRef {
 
 /// The double nearest to `unscaled 10^-scale`; nothing for more than 53 bits.
 fn decimal(unscaled: i128, scale: i8) -> Option<f64> {
-    let power = 10_f64.powi(i32::from(scale).abs());
+    let (number, power) = (unscaled as f64, 10_f64.powi(i32::from(scale).abs()));
     let exact = unscaled.unsigned_abs() <= MAX_WHOLE as u128;
-    exact.then(|| {
-        if scale < 0 {
-            unscaled as f64 * power
-        } else {
-            unscaled as f64 / power
-        }
-    })
+    exact.then_some(if scale < 0 { number * power } else { number / power })
 }
 
 /// The cells of an array of numbers, `None` for nulls. Decimals become the nearest doubles, durations seconds.

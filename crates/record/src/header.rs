@@ -7,7 +7,7 @@ use crate::header_column::shortened;
 use crate::schema::{Schema, TimeBase};
 use crate::time::Grid;
 pub(crate) use crate::wire::VERSION_5;
-use crate::wire::written;
+use crate::wire::{checksum, written};
 use fewbits_block_codec::Start;
 use std::collections::hash_map::RandomState;
 use std::hash::{BuildHasher, Hasher};
@@ -165,6 +165,11 @@ impl Header {
             _ => bytes.last_chunk::<4>().map_or(0, |check| u32::from_le_bytes(*check)),
         };
         self
+    }
+
+    /// The checksum of a record of this recording.
+    pub(crate) fn sum(&self, bytes: &[u8]) -> u32 {
+        checksum(&[&self.check.to_le_bytes(), bytes])
     }
 
     /// The start of a column for a block. A block with a bound of its own has another grid and no start.

@@ -8,7 +8,7 @@ use crate::aggregate::{self, Aggregate};
 use crate::block::Cells;
 use crate::error::{Damage, ensure};
 use crate::header::{Header, VERSION_5};
-use crate::wire::{Bytes, Fields, checked, read_checked, unzigzag, zigzag};
+use crate::wire::{Bytes, Fields, checked, read, read_checked, unzigzag, zigzag};
 
 /// Least number of rows per block with which the index has aggregates: those of a column take 25 bytes per block, of smaller blocks a larger part.
 const AGGREGATED_ROWS: usize = 4096;
@@ -150,13 +150,25 @@ pub(crate) fn max_content(kind: u8, header: &Header) -> usize {
     }
 }
 
-/// Kind, content and whole length of the special record at the front, which begins with 0.
-pub(crate) fn read_special<'a>(header: &Header, bytes: &'a [u8]) -> Result<(u8, &'a [u8], usize), Damage> {
+/// Kind, content and whole length of the special record at the front, which begins with 0. `sum` gives the checksum of the first bytes.
+pub(crate) fn read_special<'a>(
+    header: &Header,
+    bytes: &'a [u8],
+    sum: impl FnOnce(&[u8]) -> u32,
+) -> Result<(u8, &'a [u8], usize), Damage> {
     let [mark, kind] = Bytes(bytes).array()?;
     ensure!(mark == 0, Damage::NoBlock);
     let limit = max_content(kind, header);
-    let (content, whole) = read_checked(header.check, bytes, 2, 0..=limit)?;
+    let (content, whole) = read_checked(bytes, 2, 0..=limit, sum)?;
     Ok((kind, content, whole))
+}
+
+/// Entries and whole length of the segment of the index at the front, whose first block is at `offset`. `None` if it is none, or damaged.
+pub(crate) fn listed(header: &Header, bytes: &[u8], offset: u64) -> Option<(Vec<BlockInfo>, u64)> {
+    let special = read_special(header, bytes, |bytes| header.sum(bytes)).ok();
+    let (_, content, whole) = special.filter(|(kind, ..)| matches!(*kind, SEGMENT | ONLY))?;
+    let entries = read(content, |fields| segment(fields, header, offset, &[])).ok()?;
+    Some((entries, whole as u64))
 }
 
 /// The largest `f32` that does not exceed `value`.
@@ -326,7 +338,7 @@ pub(crate) fn trailer(footer: u64) -> Vec<u8> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::wire::{read, written};
+    use crate::wire::written;
     use crate::{Bound, Column, Schema, TimeBase};
 
     #[test]

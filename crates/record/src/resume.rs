@@ -7,7 +7,6 @@ use crate::header::{Header, VERSION_5};
 use crate::index::{self, BLOCKS_PER_SEGMENT, BlockInfo, Segment};
 use crate::playback::{self, Index};
 use crate::scan::{Kind, Scanner};
-use crate::wire::read;
 use std::fs::File;
 use std::io::{Seek, SeekFrom};
 use std::path::Path;
@@ -139,7 +138,8 @@ fn last_number(file: &mut File, header: &Header, entries: &[BlockInfo]) -> Resul
     let Some(bytes) = playback::read_at(file, last.offset, last.bytes)? else {
         return Ok(None);
     };
-    let block = block::length(header, &bytes).and_then(|_| block::decode(header, &bytes, |_| false));
+    let block =
+        block::length(header, &bytes, |bytes| header.sum(bytes)).and_then(|_| block::decode(header, &bytes, |_| false));
     // If another block was put there, the last number is not known.
     let block = block.ok().filter(|block| last.describes(&block.ticks, header));
     Ok(block.map(|block| block.number.unwrap_or(0)))
@@ -197,9 +197,7 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
 
 /// The segment of these bytes, if it describes as many bytes as these entries. Blocks that were damaged later are refused when they are read.
 fn listed(header: &Header, bytes: &[u8], entries: &[BlockInfo]) -> Option<Segment> {
-    let (_, content, whole) = index::read_special(header, bytes).ok()?;
-    let start = entries.first()?.offset;
-    let own = read(content, |fields| index::segment(fields, header, start, &[])).ok()?;
-    let segment = Segment::new(whole as u64, &own);
+    let (own, whole) = index::listed(header, bytes, entries.first()?.offset)?;
+    let segment = Segment::new(whole, &own);
     (segment.blocks == Segment::new(0, entries).blocks).then_some(segment)
 }

@@ -124,7 +124,7 @@ impl<R: Read + Seek> Playback<R> {
         };
         let tolerance = i64::try_from(self.header.schema.time.tolerance()).unwrap_or(i64::MAX);
         let mut blocks = Blocks::new(self, (from, to));
-        while let Some(part) = blocks.part() {
+        while let Some(part) = blocks.part().transpose() {
             let block = part.and_then(|part| match &part {
                 Part::Known(entry) if stretches.merge(entry, tolerance) => Ok(None),
                 _ => blocks.block(part).map(Some),

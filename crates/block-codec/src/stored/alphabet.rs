@@ -35,19 +35,11 @@ pub(super) const CODES: usize = CONTEXTS * SYMBOLS;
 const fn behind_difference(context: usize, symbol: usize) -> usize {
     let is_run = context < RUNS;
     let is_turn = symbol < ZERO && !is_run;
+    let sign = if is_run { 0 } else { 2 - is_turn as usize };
     match symbol.abs_diff(ZERO) {
         0 if is_run => context.saturating_sub(1),
         0 => RUNS - 1,
-        size @ 1..=2 => {
-            RUNS + 3 * (size - 1)
-                + if is_run {
-                    0
-                } else if is_turn {
-                    1
-                } else {
-                    2
-                }
-        }
+        size @ 1..=2 => RUNS + 3 * (size - 1) + sign,
         3 => 13 - is_turn as usize,
         ZERO => CONTEXTS - 1,
         _ => CONTEXTS - 1 - is_turn as usize,

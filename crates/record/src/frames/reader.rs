@@ -211,6 +211,6 @@ impl FrameReader {
 }
 
 fn read_block(header: &Header, frame: &[u8]) -> Result<Block, Damage> {
-    ensure!(block::length(header, frame)? == frame.len(), Damage::Content("length"));
+    ensure!(block::length(header, frame, |bytes| header.sum(bytes))? == frame.len(), Damage::Content("length"));
     block::decode(header, frame, |_| true)
 }
