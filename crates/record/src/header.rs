@@ -5,7 +5,7 @@ use crate::codec::{Target, adaptive};
 use crate::column::check_circle;
 use crate::header_column::shortened;
 use crate::schema::{Schema, TimeBase};
-use crate::time::Grid;
+use crate::time::{self, Grid};
 pub(crate) use crate::wire::VERSION_5;
 use crate::wire::{checksum, written};
 use fewbits_block_codec::Start;
@@ -90,21 +90,16 @@ impl Header {
                 }
             }
         }
-        let grid = match schema.time {
-            TimeBase::Numbered => Grid {
-                origin: ticks.first().copied().unwrap_or(0),
-                step: 1,
-                rows_per_block: schema.rows_per_block,
-                tolerance: 0,
-            },
-            TimeBase::Clock { tolerance, .. } => Grid::of(ticks, schema.rows_per_block, tolerance),
+        let step = match schema.time {
+            TimeBase::Numbered => 1,
+            TimeBase::Clock { tolerance, .. } => time::step(ticks, tolerance),
         };
         let header = Self {
             identity: random(),
             starts: vec![None; schema.columns.len()],
             schema,
-            origin: grid.origin,
-            step: grid.step,
+            origin: ticks.first().copied().unwrap_or(0),
+            step,
             share_bounds: share_bounds.into_iter().map(rounded_down).collect(),
             ..BLANK
         };
@@ -186,10 +181,9 @@ impl Header {
             origin: self.origin,
             step: self.step,
             rows_per_block: self.schema.rows_per_block,
-            tolerance: if self.schema.keeps_ticks {
-                0
-            } else {
-                self.schema.time.tolerance()
+            tolerance: match self.schema.keeps_ticks {
+                true => 0,
+                false => self.schema.time.tolerance(),
             },
         }
     }

@@ -74,9 +74,7 @@ impl BlockInfo {
             aggregates: Some(aggregates),
         }
     }
-}
 
-impl BlockInfo {
     /// Whether these may be the ticks of the block that this entry describes.
     pub(crate) fn describes(&self, ticks: &[i64], header: &Header) -> bool {
         let tolerance = header.schema.time.tolerance();
@@ -174,11 +172,8 @@ pub(crate) fn listed(header: &Header, bytes: &[u8], offset: u64) -> Option<(Vec<
 /// The largest `f32` that does not exceed `value`.
 fn f32_below(value: f64) -> f32 {
     let near = value as f32;
-    if f64::from(near) > value {
-        near.next_down()
-    } else {
-        near
-    }
+    let is_larger = f64::from(near) > value;
+    if is_larger { near.next_down() } else { near }
 }
 
 /// The largest number of three bytes, the first ones of a big-endian `f32`, that does not exceed `value`.
@@ -186,11 +181,8 @@ fn short_below(value: f64) -> f32 {
     let near = f32_below(value).to_bits();
     // Dropping the last byte makes a negative number larger.
     let cut = near & !0xff;
-    f32::from_bits(if near >> 31 == 1 && cut != near {
-        cut + 0x100
-    } else {
-        cut
-    })
+    let is_larger = near >> 31 == 1 && cut != near;
+    f32::from_bits(if is_larger { cut + 0x100 } else { cut })
 }
 
 fn short_above(value: f64) -> f32 {
@@ -214,20 +206,12 @@ fn level_below(value: f64, ends: (f64, f64)) -> u8 {
     let share = (value - ends.0) / (ends.1 - ends.0);
     let level = (LEVELS * share).floor().clamp(0.0, LEVELS) as u8;
     // Rounding may put the level above the value.
-    if level > 0 && level_value(level, ends) > value {
-        level - 1
-    } else {
-        level
-    }
+    level - u8::from(level > 0 && level_value(level, ends) > value)
 }
 
 fn level_above(value: f64, ends: (f64, f64)) -> u8 {
     let level = level_below(value, ends);
-    if level_value(level, ends) < value {
-        (level + 1).min(MOST)
-    } else {
-        level
-    }
+    (level + u8::from(level_value(level, ends) < value)).min(MOST)
 }
 
 fn level_value(level: u8, ends: (f64, f64)) -> f64 {

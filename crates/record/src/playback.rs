@@ -147,10 +147,8 @@ impl<R: Read + Seek> Playback<R> {
     /// # Errors
     /// If there is no such column. The request before then stays in effect.
     pub fn columns(&mut self, names: &[&str]) -> Result<&mut Self, Error> {
-        self.chosen = names
-            .iter()
-            .map(|name| self.header.schema.position(name))
-            .collect::<Result<_, _>>()?;
+        let places = names.iter().map(|name| self.header.schema.position(name));
+        self.chosen = places.collect::<Result<_, _>>()?;
         Ok(self)
     }
 

@@ -297,10 +297,7 @@ impl<W: Write> Recorder<W> {
         // Columns with starts share one code. It is shorter if they have few rows or help each other.
         let is_worth_it = columns.len() > 1 && rows <= SHARED_ROWS && self.effort == Effort::Thorough;
         let shared = is_worth_it.then(|| written(&plain.with_starts(columns)));
-        match shared {
-            Some(shared) if shared.len() < apart.len() => shared,
-            _ => apart,
-        }
+        shared.filter(|shared| shared.len() < apart.len()).unwrap_or(apart)
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), Error> {
@@ -368,11 +365,8 @@ impl<W: Write> Recorder<W> {
         }
         let header = self.header.as_ref().ok_or(Error::Broken)?;
         // Damage of which a resumed recording keeps the bytes may put more blocks between segments: a segment that lists none has them searched.
-        let listed = if self.entries.len() > BLOCKS_PER_SEGMENT {
-            &[]
-        } else {
-            self.entries.as_slice()
-        };
+        let is_listed = self.entries.len() <= BLOCKS_PER_SEGMENT;
+        let listed = if is_listed { self.entries.as_slice() } else { &[] };
         let content = written(|fields| index::segment(fields, header, 0, listed));
         let bytes = index::special(header.check, kind, &content);
         self.write(&bytes)?;

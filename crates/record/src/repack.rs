@@ -10,7 +10,7 @@ use crate::playback::Playback;
 use crate::ranges::{self, Ends};
 use crate::recorder::Recorder;
 use crate::schema::Schema;
-use fewbits_block_codec::{ArgumentError, Effort, ensure};
+use fewbits_block_codec::{Effort, ensure};
 use std::io::{Read, Seek, Write};
 
 /// What a pass over a recording finds for a column.
@@ -70,10 +70,9 @@ fn widened(column: &Column, asked: Option<Bound>, found: Found) -> Result<(Colum
     };
     let Some(own) = own else {
         // Nothing can be added to a bound that depends on the value.
-        if asked.is_some_and(|bound| bound != Bound::Lossless && bound != column.bound) {
-            let expected = "no bound for a column whose bound is relative to each value";
-            return Err(ArgumentError::new("bound", format!("{asked:?} of `{}`", column.name), expected).into());
-        }
+        let is_kept = asked.is_none_or(|bound| bound == Bound::Lossless || bound == column.bound);
+        let expected = "no bound for a column whose bound is relative to each value";
+        ensure!(is_kept, "bound", format!("{asked:?} of `{}`", column.name), expected);
         return Ok((column.clone(), false));
     };
     // Both terms may be rounded down.

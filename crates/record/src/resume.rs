@@ -50,10 +50,10 @@ pub(crate) fn open(path: &Path) -> Result<Opened, Error> {
             index = playback::index_of(&mut file, &header)?;
         }
     }
-    let resumed = match index {
-        Index::Whole(segments) => from_index(&mut file, &header, segments)?,
-        _ => None,
-    };
+    let mut resumed = None;
+    if let Index::Whole(segments) = index {
+        resumed = from_index(&mut file, &header, segments)?;
+    }
     let resumed = match resumed {
         Some(resumed) => resumed,
         None => from_blocks(&mut file, header)?,

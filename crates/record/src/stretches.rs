@@ -38,16 +38,13 @@ struct Stretches {
 
 impl Stretches {
     fn at(&mut self, number: i64) -> &mut Stretch {
+        let whole = |(_, integers): &(_, Option<Integers>)| integers.map(|_| WholeAggregate::default());
         self.found.entry(number).or_insert_with(|| Stretch {
             // The first stretch may begin before the smallest tick.
             tick: number.saturating_mul(self.every),
             rows: 0,
             columns: vec![Aggregate::default(); self.chosen.len()],
-            wholes: self
-                .chosen
-                .iter()
-                .map(|(_, integers)| integers.map(|_| WholeAggregate::default()))
-                .collect(),
+            wholes: self.chosen.iter().map(whole).collect(),
         })
     }
 

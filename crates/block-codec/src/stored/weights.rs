@@ -73,22 +73,18 @@ impl Tables {
         let groups = joined(counts.iter().map(|counts| (1, *counts)), bits, 0.0);
         let largest = groups.iter().flat_map(|group| group.counts).max().unwrap_or(0) as f32;
         let share = 1.0 / ROWS_OF_ONE.max(largest / (LARGEST_WEIGHT * LARGEST_WEIGHT) as f32);
-        let weight = |count: u32| ((count as f32 * share).sqrt() + 0.5) as u32;
-        let weights = groups.iter().map(|group| {
-            group
-                .counts
-                .map(|count| weight(count).clamp(count.min(1), LARGEST_WEIGHT) as u8)
-        });
-        let mut table_of = [0; CONTEXTS];
-        let tables = groups
-            .iter()
-            .enumerate()
-            .flat_map(|(at, group)| std::iter::repeat_n(at, group.size));
-        table_of.iter_mut().zip(tables).for_each(|(own, table)| *own = table);
+        let root = |count: u32| ((count as f32 * share).sqrt() + 0.5) as u32;
+        let weight = |count: u32| root(count).clamp(count.min(1), LARGEST_WEIGHT) as u8;
+        let (mut table_of, mut weights, mut begun) = ([0; CONTEXTS], Vec::new(), 0);
+        for group in groups {
+            table_of[begun..begun + group.size].fill(weights.len());
+            weights.push(group.counts.map(weight));
+            begun += group.size;
+        }
         Self {
             sizes: [ZERO - lowest, highest - ZERO],
             table_of,
-            weights: weights.collect(),
+            weights,
         }
     }
 
@@ -102,7 +98,7 @@ impl Tables {
             let is_joined = join.decide(coder, own);
             table_of[context] = table_of[context - 1] + usize::from(!is_joined);
         }
-        let mut weight_coder = WeightCoder::new();
+        let mut weight_coder = WeightCoder::NEW;
         let mut weights: Vec<[u8; SYMBOLS]> = Vec::with_capacity(CONTEXTS);
         for table in 0..=table_of[CONTEXTS - 1] {
             let own = wanted.map(|tables| &tables.weights[table]);
@@ -151,12 +147,10 @@ struct WeightCoder {
 }
 
 impl WeightCoder {
-    fn new() -> Self {
-        Self {
-            lengths: [[Count::NEW; WEIGHT_BITS]; WEIGHT_BITS + 1],
-            seconds: [Count::NEW; WEIGHT_BITS + 1],
-        }
-    }
+    const NEW: Self = Self {
+        lengths: [[Count::NEW; WEIGHT_BITS]; WEIGHT_BITS + 1],
+        seconds: [Count::NEW; WEIGHT_BITS + 1],
+    };
 
     /// Codes the weights of one table.
     fn code<C: Coder>(
