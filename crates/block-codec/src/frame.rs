@@ -120,11 +120,9 @@ impl Frames {
 
     /// The same with another computing time.
     #[must_use]
-    pub fn with_effort(self, effort: Effort) -> Self {
-        Self {
-            codec: self.codec.with_effort(effort),
-            ..self
-        }
+    pub fn with_effort(mut self, effort: Effort) -> Self {
+        self.codec = self.codec.with_effort(effort);
+        self
     }
 
     /// The samples as a frame.

@@ -231,7 +231,8 @@ impl Grid {
                 let moved = width - 1 + 2 * Self::digits_moved(*width, *phase);
                 // Twice the middle in digits, because the middle may be half of a digit.
                 let twice = 2 * i128::from(*width) * i128::from(index) + i128::from(moved);
-                0.5 * twice as f64 / TENS[usize::from(*decimals)]
+                let twice = i64::try_from(twice).map_or(twice as f64, |twice| twice as f64);
+                0.5 * twice / TENS[usize::from(*decimals)]
             }
             Self::Stepped {
                 decimals,

@@ -28,6 +28,7 @@ use crate::counts::Counts;
 use crate::error::{Damaged, ensure};
 use crate::indices::code_first;
 use crate::rows::{LARGEST, code_all};
+use crate::stored::alphabet::size_class;
 use crate::stored::order::{Order, Sums, VALUES};
 use crate::stored::words::{HEAD_BITS, LANES, Words, fill_slots, stretches};
 
@@ -102,13 +103,7 @@ impl Lane {
         let is_cell = (1..RANGES).contains(&symbol);
         let size = if is_cell { symbol.abs_diff(ZERO) } else { SYMBOLS };
         let is_up = if is_cell { symbol > ZERO } else { symbol % 2 == 1 };
-        let class = match size {
-            0..=4 => size,
-            5..=6 => 5,
-            7..=9 => 6,
-            10..=13 => 7,
-            _ => 8,
-        };
+        let class = size_class(size);
         self.class = if is_up { 8 + class } else { 8 - class };
         let was_zero = self.size == 0;
         self.rests = if was_zero && size == 0 { self.rests + 1 } else { 0 };

@@ -105,16 +105,13 @@ impl BlockCodec {
     ///
     /// # Errors
     /// If `period` is not positive and finite, or above `2^40` times the bound.
-    pub fn on_circle(self, period: f64) -> Result<Self, Error> {
+    pub fn on_circle(mut self, period: f64) -> Result<Self, Error> {
         ArgumentError::positive("period", period)?;
-        if self.is_lossless() {
-            return Ok(self);
+        if !self.is_lossless() {
+            ensure!(period / self.delta <= MOST_CELLS, "period", period, "at most 2^40 times the bound");
+            self.period = Some(period);
         }
-        ensure!(period / self.delta <= MOST_CELLS, "period", period, "at most 2^40 times the bound");
-        Ok(Self {
-            period: Some(period),
-            ..self
-        })
+        Ok(self)
     }
 
     /// A codec that returns every sample to the last bit.

@@ -138,13 +138,9 @@ impl Header {
     }
 
     /// The header of a recording of this version with the same columns.
-    pub(crate) fn renewed(self) -> Self {
-        Self {
-            version: VERSION,
-            identity: random(),
-            ..self
-        }
-        .checked()
+    pub(crate) fn renewed(mut self) -> Self {
+        self.version = VERSION;
+        self.with_identity(random())
     }
 
     /// Whether the index of a finished recording must follow.

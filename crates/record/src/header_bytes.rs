@@ -6,7 +6,7 @@ use crate::error::{Damage, Error, ensure};
 use crate::header::{BLANK, Form, Header, IDENTITY_BYTES, MAGIC, MAGIC_5, MAX_HEADER, VERSION, VERSION_5};
 use crate::header_column::{column, refused};
 use crate::schema::{MAX_COLUMNS, Schema, TIME_NAME, TimeBase, TimeFormat, default_rows};
-use crate::wire::{Bytes, CHECK_BYTES, Fields, checksum, push_varint, with_checksum, written};
+use crate::wire::{Bytes, CHECK_BYTES, Fields, checksum, flag, push_varint, with_checksum, written};
 use fewbits_block_codec::bytes::Unread;
 
 impl Header {
@@ -115,7 +115,6 @@ impl Header {
                 format,
             } => (1 + format as u8, decimals, tolerance),
         };
-        let flag = |given: bool, flag: u8| if given { flag } else { 0 };
         let flags = flag(self.form == Form::Stream, STREAM)
             | flag(self.origin != 0, ORIGIN)
             | flag(own.columns.len() > 1, COLUMNS)

@@ -141,7 +141,7 @@ impl<W: Write> Recorder<W> {
             entries: Vec::new(),
             segments: Vec::new(),
             next_number: 0,
-            append: Append::none(),
+            append: Append::default(),
             effort: Effort::default(),
             identity: None,
             broken: false,
@@ -158,11 +158,9 @@ impl<W: Write> Recorder<W> {
     /// is random. Blocks of recordings with one identity and equal headers can be exchanged unnoticed: derive it from what is recorded. No
     /// effect on a recording that is resumed.
     #[must_use]
-    pub fn with_identity(self, identity: u32) -> Self {
-        Self {
-            identity: Some(identity),
-            ..self
-        }
+    pub fn with_identity(mut self, identity: u32) -> Self {
+        self.identity = Some(identity);
+        self
     }
 
     /// Columns and time of the recording.

@@ -1,6 +1,6 @@
 //! Finding the place where an existing recording is continued.
 
-use crate::append::{self, Append};
+use crate::append::{self, Append, State};
 use crate::block;
 use crate::error::{Damage, Error, ensure};
 use crate::header::{Header, VERSION_5};
@@ -62,7 +62,7 @@ pub(crate) fn open(path: &Path) -> Result<Opened, Error> {
     ensure!(are_numbers_left, Error::Header(Damage::Content("number of a block")));
     file.seek(SeekFrom::Start(resumed.offset)).map_err(Error::io("read"))?;
     let handle = file.try_clone().map_err(Error::io("open"))?;
-    let append = Append::planned(handle, path, resumed.offset);
+    let append = Append::new(handle, path, State::Planned(resumed.offset));
     Ok(Opened::InPlace(file, append, Box::new(resumed)))
 }
 
@@ -89,7 +89,7 @@ pub(crate) fn copy(locked: File, path: &Path) -> Result<(File, Append), Error> {
     options.read(true).write(true).create(true).truncate(true);
     let file = options.open(append::beside(path)).map_err(Error::io("copy"))?;
     append::lock(&file)?;
-    let append = Append::copy(file.try_clone().map_err(Error::io("copy"))?, locked, path);
+    let append = Append::new(file.try_clone().map_err(Error::io("copy"))?, path, State::Copy(locked));
     Ok((file, append))
 }
 

@@ -131,11 +131,9 @@ impl Schema {
     /// Declares that ticks were restored from a recording with this tolerance: a recorder returns them exactly, so that the stated
     /// tolerance still holds for the original ones.
     #[must_use]
-    pub fn with_restored_ticks(self) -> Self {
-        Self {
-            keeps_ticks: true,
-            ..self
-        }
+    pub fn with_restored_ticks(mut self) -> Self {
+        self.keeps_ticks = true;
+        self
     }
 
     /// Sets the number of rows per block; [`ROWS_PER_BLOCK`] stands for the default of this many columns. With small blocks fewer rows are lost with a block, and rows wait less on a link. Each block
@@ -151,13 +149,11 @@ impl Schema {
     }
 
     /// As [`with_rows_per_block`](Self::with_rows_per_block), for what a header states.
-    pub(crate) fn with_exact_rows(self, rows: usize) -> Result<Self, Error> {
+    pub(crate) fn with_exact_rows(mut self, rows: usize) -> Result<Self, Error> {
         let limit = MAX_CELLS / (self.columns.len() + 1);
         ensure!((1..=limit).contains(&rows), "rows_per_block", rows, format!("1 to {limit} rows"));
-        Ok(Self {
-            rows_per_block: rows,
-            ..self
-        })
+        self.rows_per_block = rows;
+        Ok(self)
     }
 
     /// The columns, in their order.

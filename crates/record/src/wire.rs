@@ -63,6 +63,11 @@ pub(crate) fn read_checked(
     Ok((content, end + CHECK_BYTES))
 }
 
+/// A flag that is given, or none.
+pub(crate) fn flag<T: Default>(given: bool, flag: T) -> T {
+    if given { flag } else { T::default() }
+}
+
 /// The first three bytes of a bound, highest first.
 pub(crate) fn short_bound<F: Fields>(fields: &mut F, own: f64) -> Result<f64, Damage> {
     let [a, b, c, ..] = own.to_be_bytes();

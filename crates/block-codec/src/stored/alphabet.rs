@@ -47,14 +47,24 @@ const fn behind_difference(context: usize, symbol: usize) -> usize {
 }
 
 const fn behind_value(symbol: usize) -> usize {
-    let class = match symbol.abs_diff(ZERO) {
-        size @ 0..=4 => size,
+    let size = symbol.abs_diff(ZERO);
+    let class = if size < 10 { size_class(size) } else { 7 };
+    match symbol {
+        ESCAPE => CONTEXTS - 1,
+        ..ZERO => 7 - class,
+        _ => 7 + class,
+    }
+}
+
+/// The class of a size of values: 0 to 4, 5 to 6, 7 to 9, 10 to 13, more.
+pub(crate) const fn size_class(size: usize) -> usize {
+    match size {
+        0..=4 => size,
         5..=6 => 5,
         7..=9 => 6,
-        ZERO => return CONTEXTS - 1,
-        _ => 7,
-    };
-    if symbol < ZERO { 7 - class } else { 7 + class }
+        10..=13 => 7,
+        _ => 8,
+    }
 }
 
 /// The contexts behind symbols of differences, and of values: at `SYMBOLS context + symbol`.

@@ -23,7 +23,7 @@
 //! all words in front of the tail are read, the states of the lanes 1 to 3 are `2^16` more than numbers of 16 bits, and the tail reads these
 //! three as words before those that are left. Its state is that of lane 0. It begins with `p` words that are zero, and ends with the state 1.
 
-mod alphabet;
+pub(crate) mod alphabet;
 mod lane;
 mod lanes;
 pub(crate) mod order;

@@ -184,14 +184,13 @@ impl Plan {
             longer > rows / ROWS_OF_LONG
         });
         let usual = (most.count() as u32).saturating_sub(SMALLEST);
-        let estimated = match order.kind {
-            VALUES => estimated_bits::<true>,
-            _ => estimated_bits::<false>,
-        };
         let plan = |low| Self {
             order: *order,
             low,
-            bits: estimated(parts, low),
+            bits: match order.kind {
+                VALUES => estimated_bits::<true>(parts, low),
+                _ => estimated_bits::<false>(parts, low),
+            },
         };
         let own = plan(low);
         if usual < low { own.shorter(plan(usual)) } else { own }
