@@ -9,6 +9,7 @@
 //! | any other | `time`: 64-bit integers, ticks; metadata `decimals` |
 
 use crate::block::{Block, Cells};
+use crate::column::Column;
 use crate::error::{Error, ensure, listed};
 use crate::integers::Integers;
 use crate::recorder::Recorder;
@@ -135,6 +136,7 @@ pub fn cells(name: &str, array: &dyn Array) -> Result<Cells, Error> {
             .map(|cell| cell.map_or(Some(None), |cell| number(cell).map(Some)))
             .collect()
     }
+    let bit = |cell: Option<bool>| cell.map(|yes| f64::from(u8::from(yes)));
     let refuse = |given: String, expected: &str| -> Error { ArgumentError::new("column", given, expected).into() };
     let found = match array.data_type() {
         DataType::Float64 => of::<Float64Type>(array, Some),
@@ -147,13 +149,7 @@ pub fn cells(name: &str, array: &dyn Array) -> Result<Cells, Error> {
         DataType::UInt32 => of::<UInt32Type>(array, |x| Some(x.into())),
         DataType::Int64 => of::<Int64Type>(array, |x| (x.abs() <= MAX_WHOLE).then_some(x as f64)),
         DataType::UInt64 => of::<UInt64Type>(array, |x| (x <= MAX_WHOLE as u64).then_some(x as f64)),
-        DataType::Boolean => Some(
-            array
-                .as_boolean()
-                .iter()
-                .map(|cell| cell.map(|yes| f64::from(u8::from(yes))))
-                .collect(),
-        ),
+        DataType::Boolean => Some(array.as_boolean().iter().map(bit).collect()),
         DataType::Null => Some(vec![None; array.len()]),
         DataType::Decimal32(_, scale) => of::<Decimal32Type>(array, |x| decimal(x.into(), *scale)),
         DataType::Decimal64(_, scale) => of::<Decimal64Type>(array, |x| decimal(x.into(), *scale)),
@@ -171,9 +167,8 @@ pub fn cells(name: &str, array: &dyn Array) -> Result<Cells, Error> {
 fn codes(name: &str, array: &dyn Array, integers: Integers) -> Result<Cells, Error> {
     if *array.data_type() == DataType::Int64 {
         let numbers = array.as_primitive::<Int64Type>().iter();
-        return Ok(numbers
-            .map(|number| number.map(|number| integers.code(number)))
-            .collect());
+        let code = |number: Option<i64>| number.map(|number| integers.code(number));
+        return Ok(numbers.map(code).collect());
     }
     let numbers = cells(name, array)?.into_iter();
     let code = |number: Option<f64>| number.map_or(Some(None), |number| integers.code_of(number).map(Some));
@@ -211,13 +206,8 @@ pub fn ticks(name: &str, array: &dyn Array, decimals: u8) -> Result<Vec<i64>, Er
         _ => scale.filter(|scale| tick % scale == 0).map(|scale| tick / scale),
     };
     let numbers = retyped(array, DataType::Int64)?;
-    let ticks: Option<Vec<i64>> = numbers
-        .as_primitive::<Int64Type>()
-        .values()
-        .iter()
-        .map(scaled)
-        .collect();
-    ticks.ok_or_else(refused)
+    let numbers = numbers.as_primitive::<Int64Type>().values().iter();
+    numbers.map(scaled).collect::<Option<_>>().ok_or_else(refused)
 }
 
 impl<W: Write> Recorder<W> {
@@ -249,15 +239,11 @@ impl<W: Write> Recorder<W> {
                 ticks(name, array(name)?, decimals)?
             }
         };
-        let columns = self
-            .schema()
-            .columns()
-            .iter()
-            .map(|column| match (column.integers, array(column.name())?) {
-                (Some(integers), array) => codes(column.name(), array, integers),
-                (None, array) => cells(column.name(), array),
-            });
-        let columns: Vec<Cells> = columns.collect::<Result<_, _>>()?;
+        let found = |column: &Column| match (column.integers, array(column.name())?) {
+            (Some(integers), array) => codes(column.name(), array, integers),
+            (None, array) => cells(column.name(), array),
+        };
+        let columns: Vec<Cells> = self.schema().columns().iter().map(found).collect::<Result<_, _>>()?;
         self.push_columns(&ticks, &columns)
     }
 }

@@ -186,11 +186,7 @@ impl Header {
 
     /// The bound of a column in a block; `own` is the block's own one.
     pub(crate) fn target(&self, column: usize, own: Option<f64>) -> Target {
-        let spec = &self.schema.columns[column];
-        Target {
-            bound: spec.bound_in(own.unwrap_or(self.share_bounds[column])),
-            period: spec.period,
-        }
+        Target::of(&self.schema.columns[column], own.unwrap_or(self.share_bounds[column]))
     }
 }
 

@@ -118,10 +118,7 @@ pub(crate) fn column<F: Fields>(
         let earlier = number(fields, own.earlier)?;
         column = column.with_earlier_bound(earlier).map_err(refused)?;
     }
-    let target = Target {
-        bound: column.bound_in(bound_of_share),
-        period: column.period,
-    };
+    let target = Target::of(&column, bound_of_share);
     let start = (kind & HAS_START != 0).then(|| adaptive::code_start(fields, start, &target));
     Ok((column, bound_of_share, start.transpose()?))
 }

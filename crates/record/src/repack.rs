@@ -3,7 +3,7 @@
 //! The rows of the new recording are the restored ones of the old, so their distance from the original samples is at most the sum of both
 //! bounds. The new header states both ([`Column::earlier_bound`]).
 
-use crate::bound::{Bound, TENS};
+use crate::bound::{Bound, half_unit};
 use crate::column::Column;
 use crate::error::Error;
 use crate::playback::Playback;
@@ -19,11 +19,6 @@ struct Found {
     ends: Ends,
     /// The largest bound of a share.
     share_bound: f64,
-}
-
-/// Half a unit of the last decimal.
-fn half_unit(places: u8) -> f64 {
-    0.5 / TENS.get(usize::from(places)).copied().unwrap_or(1.0)
 }
 
 /// The distance that a bound allows, in units of the column. `None` if it depends on the value.

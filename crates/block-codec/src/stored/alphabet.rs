@@ -51,7 +51,7 @@ const fn behind_value(symbol: usize) -> usize {
     let class = if size < 10 { size_class(size) } else { 7 };
     match symbol {
         ESCAPE => CONTEXTS - 1,
-        ..ZERO => 7 - class,
+        1..ZERO => 7 - class,
         _ => 7 + class,
     }
 }

@@ -15,6 +15,7 @@ mod plain;
 mod relative;
 
 use crate::bound::Bound;
+use crate::column::Column;
 use crate::error::{Damage, ensure};
 use fewbits_block_codec::{Effort, Start};
 
@@ -44,6 +45,12 @@ pub(crate) struct Target {
 }
 
 impl Target {
+    /// That of a column where its share is worth this bound.
+    pub(crate) fn of(column: &Column, share_bound: f64) -> Self {
+        let (bound, period) = (column.bound_in(share_bound), column.period);
+        Self { bound, period }
+    }
+
     pub(crate) fn holds(&self, sample: f64, restored: f64) -> bool {
         self.bound.holds(sample, restored, self.period)
     }
