@@ -20,9 +20,10 @@ pub(crate) struct Order {
 impl Order {
     /// What is coded of all indices but the first.
     pub(crate) fn differences(self, indices: &[i64]) -> Vec<i64> {
-        let slopes = || indices.windows(2).map(|row| row[1] - row[0]);
+        let others = indices.get(1..).unwrap_or_default();
+        let slopes = || others.iter().zip(indices).map(|(index, last)| index - last);
         match self.kind {
-            VALUES => indices.iter().skip(1).map(|index| index - self.centre).collect(),
+            VALUES => others.iter().map(|index| index - self.centre).collect(),
             FIRST => slopes().collect(),
             _ => {
                 let bends = indices.windows(3).map(|row| row[2] - row[1] - (row[1] - row[0]));
