@@ -4,7 +4,7 @@
 //! equal in both ends are output. The code ends with the fewest bytes that, followed by zeros, lie in the interval. The decoder computes
 //! them again, so it detects bytes after the end.
 
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use std::hint::select_unpredictable;
 
 /// Bits of a probability.
@@ -202,6 +202,14 @@ impl<'a> Reader<'a> {
         self.taken += 1;
     }
 
+    #[inline(always)]
+    fn refill(&mut self) {
+        while self.interval.settled() {
+            self.interval.shift();
+            self.take();
+        }
+    }
+
     /// Checks that the decisions read are all that was written.
     ///
     /// # Errors
@@ -211,11 +219,10 @@ impl<'a> Reader<'a> {
         // The bytes that were shifted out of the interval are settled; the end follows them.
         let settled = self.taken - AHEAD;
         let tail = self.bytes.get(settled..).unwrap_or_default();
-        if self.bytes.len() == settled + count && tail == &end.to_be_bytes()[..count] {
-            return Ok(());
-        }
         let expected = "the bytes that a writer of as many rows ends with";
-        Err(Damaged::new("block", format!("{} bytes", self.bytes.len()), expected))
+        let is_end = self.bytes.len() == settled + count && tail == &end.to_be_bytes()[..count];
+        ensure!(is_end, Damaged::new("block", format!("{} bytes", self.bytes.len()), expected));
+        Ok(())
     }
 }
 
@@ -228,10 +235,7 @@ impl Coder for Reader<'_> {
         if !bit {
             self.ahead -= part + 1;
         }
-        while self.interval.settled() {
-            self.interval.shift();
-            self.take();
-        }
+        self.refill();
         bit
     }
 
@@ -243,10 +247,7 @@ impl Coder for Reader<'_> {
         self.ahead -= skipped;
         self.interval.low += skipped;
         self.interval.width = select_unpredictable(bit, part, self.interval.width - (part + 1));
-        while self.interval.settled() {
-            self.interval.shift();
-            self.take();
-        }
+        self.refill();
         bit
     }
 

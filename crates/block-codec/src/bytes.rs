@@ -105,11 +105,7 @@ impl<'a> Bytes<'a> {
     /// # Errors
     /// As [`varint`](Self::varint), or if the integer is larger.
     pub fn count(&mut self, limit: usize, what: &'static str) -> Result<usize, Unread> {
-        let value = self.varint()?;
-        usize::try_from(value)
-            .ok()
-            .filter(|count| *count <= limit)
-            .ok_or(Unread::Content(what))
+        Fields::count(self, 0, limit, what)
     }
 
     /// Checks that nothing is left.
@@ -117,11 +113,8 @@ impl<'a> Bytes<'a> {
     /// # Errors
     /// If bytes are left.
     pub fn finish(self) -> Result<(), Unread> {
-        if self.0.is_empty() {
-            Ok(())
-        } else {
-            Err(Unread::Content("length"))
-        }
+        ensure!(self.0.is_empty(), Unread::Content("length"));
+        Ok(())
     }
 }
 

@@ -3,11 +3,11 @@
 use crate::arithmetic::Reader;
 use crate::bytes::Bytes;
 use crate::error::{Damaged, ensure};
-use crate::head::{Coding, Head};
+use crate::head::Coding;
 use crate::indices::{code_block, from_pco_bytes, from_wrapped_pco, raw_samples};
 use crate::rows::Others;
 use crate::sections::SECTIONS;
-use crate::{BlockCodec, Error, check_rows, learned, levels, stored};
+use crate::{BlockCodec, Error, learned, levels, stored};
 
 impl BlockCodec {
     /// The samples of a block of `rows` rows.
@@ -23,7 +23,7 @@ impl BlockCodec {
     /// # Errors
     /// As [`decode`](Self::decode), or if a column has another number of rows.
     pub fn decode_with(&self, bytes: &[u8], rows: usize, others: &[&[f64]]) -> Result<Vec<f64>, Error> {
-        check_rows(rows, others)?;
+        let others = Others::new(others, rows)?;
         if rows == 0 {
             return match bytes.len() {
                 0 => Ok(Vec::new()),
@@ -32,18 +32,25 @@ impl BlockCodec {
         }
         match bytes.strip_prefix(&SECTIONS) {
             Some(sections) => self.decode_sections(sections, rows),
-            None => self.decode_section(bytes, rows, others),
+            None => self.decode_section(bytes, rows, others.as_ref()),
         }
     }
 
     /// The samples of a block without sections, of at least one row.
-    pub(crate) fn decode_section(&self, bytes: &[u8], rows: usize, others: &[&[f64]]) -> Result<Vec<f64>, Error> {
+    pub(crate) fn decode_section(
+        &self,
+        bytes: &[u8],
+        rows: usize,
+        others: Option<&Others<'_>>,
+    ) -> Result<Vec<f64>, Error> {
         let mut bytes = Bytes(bytes);
         let head = self.read_head(&mut bytes, rows)?;
         let rest = bytes.0;
-        let others = joint_columns(&head, others)?;
+        let expected = "the other columns that it was written with";
+        ensure!(!head.joint || others.is_some(), Damaged::new("block", "joint", expected));
+        let others = others.filter(|_| head.joint);
         let keys = match head.coding {
-            Coding::Levels => Some(Reader::all(rest, |coder| levels::code(coder, true, None, rows, others.as_ref()))?),
+            Coding::Levels => Some(Reader::all(rest, |coder| levels::code(coder, true, None, rows, others))?),
             Coding::TabledLevels => Some(levels::read_tabled(rest, rows, learned::read)?),
             Coding::StoredLevels => Some(levels::read_tabled(rest, rows, stored::read)?),
             _ => None,
@@ -59,7 +66,7 @@ impl BlockCodec {
         let indices = match head.coding {
             Coding::Models | Coding::Counts => {
                 let by_models = head.coding == Coding::Models;
-                Reader::all(rest, |coder| code_block(coder, by_models, &grid, None, rows, others.as_ref()))?
+                Reader::all(rest, |coder| code_block(coder, by_models, &grid, None, rows, others))?
             }
             Coding::Wrapped => from_wrapped_pco::<i64>(rest, rows)?,
             Coding::Tables => learned::read(rest, rows)?,
@@ -75,11 +82,4 @@ impl BlockCodec {
         }
         Ok(samples)
     }
-}
-
-/// The other columns of a joint block.
-fn joint_columns<'a>(head: &Head<'_>, others: &[&'a [f64]]) -> Result<Option<Others<'a>>, Damaged> {
-    let expected = "the other columns that it was written with";
-    ensure!(!head.joint || !others.is_empty(), Damaged::new("block", "joint", expected));
-    Ok(head.joint.then(|| Others::new(others)))
 }

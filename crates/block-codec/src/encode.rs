@@ -7,7 +7,7 @@ use crate::indices::{smallest_pco, write_block};
 use crate::rows::Others;
 use crate::stored::STORED_ROWS;
 use crate::vectors::wide;
-use crate::{BlockCodec, Effort, Error, check_rows, levels};
+use crate::{BlockCodec, Effort, Error, levels};
 use std::borrow::Cow;
 
 /// Smallest number of rows for which an anchor of eight bytes is stored.
@@ -33,7 +33,7 @@ impl Shortest {
         }
     }
 
-    /// Keeps a block without other columns and, if there are any, one with them.
+    /// Keeps a block without other columns and, if there are any, one with them: they may mislead the models.
     fn keep_both(
         &mut self,
         others: Option<&Others<'_>>,
@@ -70,7 +70,11 @@ impl BlockCodec {
     /// # Errors
     /// If a column has another number of rows, and as [`encode`](Self::encode).
     pub fn encode_with(&self, samples: &[f64], others: &[&[f64]]) -> Result<Vec<u8>, Error> {
-        check_rows(samples.len(), others)?;
+        self.encode_beside(samples, Others::new(others, samples.len())?.as_ref())
+    }
+
+    /// As [`encode_with`](Self::encode_with).
+    pub(crate) fn encode_beside(&self, samples: &[f64], others: Option<&Others<'_>>) -> Result<Vec<u8>, Error> {
         if samples.is_empty() {
             return Ok(Vec::new());
         }
@@ -78,14 +82,12 @@ impl BlockCodec {
             return self.encode_fast(samples, true);
         }
         let mut best = Shortest::default();
-        // Other columns may mislead the models: the shorter of both blocks is kept.
-        let others = (!others.is_empty()).then(|| Others::new(others));
         let few = |best: &Shortest| best.length() <= FEW * samples.len() / 8;
         for (i, grid) in self.grids(samples).into_iter().enumerate() {
             if i > 0 && few(&best) {
                 break;
             }
-            self.encode_on(&grid, samples, others.as_ref(), &mut best)?;
+            self.encode_on(&grid, samples, others, &mut best)?;
         }
         if best.length() > VERY_FINE * samples.len() / 8 {
             if let Some(numbers) = smallest_pco(samples, best.length())? {
@@ -94,7 +96,7 @@ impl BlockCodec {
             let keys = samples.iter().map(|sample| levels::key_of_sample(*sample));
             if let Some(found) = levels::levels(keys, self.effort) {
                 let head = |joint| self.head(None, Coding::Levels, joint, &[]);
-                best.keep_both(others.as_ref(), |others| levels::write(head(others.is_some()), true, &found, others))?;
+                best.keep_both(others, |others| levels::write(head(others.is_some()), true, &found, others))?;
             }
             best.keep(raw(samples));
         }
@@ -141,7 +143,7 @@ impl BlockCodec {
         if let Some(period) = self.period
             && samples.iter().all(|x| (0.0..period).contains(x))
         {
-            grids.extend(Grid::decimal(samples, self.delta));
+            grids.extend(Grid::decimal(samples, self.delta, false));
         }
         grids.iter().map(|grid| grid.fitted(samples, self.effort)).collect()
     }
@@ -161,8 +163,8 @@ impl BlockCodec {
             samples.iter().copied().filter(is_ordinary).collect()
         };
         let anchor = if samples.len() >= ANCHORED_ROWS { first } else { 0.0 };
-        Grid::decimal(&ordinary, self.delta).or_else(|| match lossless {
-            true => Grid::single(&ordinary),
+        Grid::decimal(&ordinary, self.delta, false).or_else(|| match lossless {
+            true => Grid::decimal(&ordinary, 0.0, true),
             false => Some(Grid::line(self.delta, anchor)),
         })
     }

@@ -45,11 +45,8 @@ impl ArgumentError {
     /// # Errors
     /// If `value` is infinite or NaN.
     pub fn finite(name: &'static str, value: f64) -> Result<f64, Self> {
-        if value.is_finite() {
-            Ok(value)
-        } else {
-            Err(Self::new(name, value, "a finite number"))
-        }
+        ensure!(value.is_finite(), Self::new(name, value, "a finite number"));
+        Ok(value)
     }
 
     /// Accepts finite numbers above zero.
@@ -57,11 +54,8 @@ impl ArgumentError {
     /// # Errors
     /// If `value` is infinite, NaN, or not above zero.
     pub fn positive(name: &'static str, value: f64) -> Result<f64, Self> {
-        if value.is_finite() && value > 0.0 {
-            Ok(value)
-        } else {
-            Err(Self::new(name, value, "a finite number above 0"))
-        }
+        ensure!(value.is_finite() && value > 0.0, Self::new(name, value, "a finite number above 0"));
+        Ok(value)
     }
 }
 

@@ -50,33 +50,24 @@ impl BlockCodec {
         let grid = self.grids(samples).into_iter().next();
         let coded = grid.map(|grid| (grid, self.indices(&grid, samples)));
         if may_have_sections && samples.len() >= LEAST_ROWS {
+            let key = |sample: &f64| levels::key_of_sample(*sample) as i64;
             let sections = match &coded {
                 Some((_, (indices, exceptions))) if exceptions.is_empty() => sections(indices),
-                _ => sections(
-                    &samples
-                        .iter()
-                        .map(|sample| levels::key_of_sample(*sample) as i64)
-                        .collect::<Vec<_>>(),
-                ),
+                _ => sections(&samples.iter().map(key).collect::<Vec<_>>()),
             };
             if sections.len() > 1 {
                 return self.encode_sections(samples, &sections);
             }
         }
-        let bytes = match &coded {
-            Some((grid, (indices, exceptions))) => self.encode_fast_on(grid, samples, indices, exceptions)?,
-            None => None,
-        };
-        let bytes = match bytes {
+        let on_grid =
+            coded.map(|(grid, (indices, exceptions))| self.encode_fast_on(&grid, samples, &indices, &exceptions));
+        let bytes = match on_grid.transpose()?.flatten() {
             Some(bytes) => bytes,
             None => self.encode_samples(samples)?,
         };
         // The byte of the head is not counted.
-        Ok(if bytes.len() > 8 * samples.len() {
-            raw(samples)
-        } else {
-            bytes
-        })
+        let is_longer = bytes.len() > 8 * samples.len();
+        Ok(if is_longer { raw(samples) } else { bytes })
     }
 
     /// A list of levels behind the head of its coding.

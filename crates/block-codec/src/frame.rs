@@ -26,6 +26,7 @@
 //! ```
 //! Numbers are little-endian. The bound is 0 in kinds without one. The checksum is that of Ethernet (CRC-32/ISO-HDLC).
 
+use crate::bytes::Bytes;
 use crate::{ArgumentError, BlockCodec, Damaged, Effort, Error, ensure};
 use std::borrow::Cow;
 
@@ -119,11 +120,9 @@ impl Frames {
 
     /// The same with another computing time.
     #[must_use]
-    pub fn with_effort(self, effort: Effort) -> Self {
-        Self {
-            codec: self.codec.with_effort(effort),
-            ..self
-        }
+    pub fn with_effort(mut self, effort: Effort) -> Self {
+        self.codec = self.codec.with_effort(effort);
+        self
     }
 
     /// The samples as a frame.
@@ -142,23 +141,23 @@ impl Frames {
     /// As [`encode`](Self::encode). `frames` is then unchanged.
     pub fn encode_into<'a>(&self, samples: impl Into<Samples<'a>>, frames: &mut Vec<u8>) -> Result<(), Error> {
         let samples = samples.into();
-        let rows = match samples {
-            Samples::Doubles(samples) => samples.len(),
-            Samples::Singles(samples) => samples.len(),
-            Samples::Integers(samples) => samples.len(),
+        let (kind, rows) = match samples {
+            Samples::Doubles(samples) => (DOUBLES, samples.len()),
+            Samples::Singles(samples) => (SINGLES, samples.len()),
+            Samples::Integers(samples) => (INTEGERS, samples.len()),
         };
-        let (kind, content) = match (self.bound, samples, doubles(samples)) {
-            (Some(_), _, Some(doubles)) => (WITHIN, vec![self.codec.encode(&doubles)?]),
-            (None, Samples::Doubles(_), Some(doubles)) => (DOUBLES, vec![self.codec.encode(&doubles)?]),
-            (None, Samples::Singles(_), Some(doubles)) => (SINGLES, vec![self.codec.encode(&doubles)?]),
-            (None, Samples::Integers(_), Some(doubles)) => (INTEGERS, vec![self.codec.encode(&doubles)?]),
-            (None, Samples::Integers(samples), None) => {
+        let (kind, content) = match (doubles(samples), samples) {
+            (Some(doubles), _) => {
+                let kind = if self.bound.is_some() { WITHIN } else { kind };
+                (kind, vec![self.codec.encode(&doubles)?])
+            }
+            (None, Samples::Integers(samples)) if self.bound.is_none() => {
                 let half = |of: fn(i64) -> i64| samples.iter().map(|x| of(*x) as f64).collect::<Vec<f64>>();
                 let high = self.codec.encode(&half(|x| x >> 32))?;
                 let low = self.codec.encode(&half(|x| x & LOW))?;
                 (HALVES, vec![(high.len() as u64).to_le_bytes().to_vec(), high, low])
             }
-            (_, _, None) => {
+            _ => {
                 let expected = "integers of at most 53 bits, or no bound";
                 return Err(ArgumentError::new("samples", "an integer that is no exact double", expected).into());
             }
@@ -192,31 +191,30 @@ struct Parts<'a> {
     kind: u8,
     bound: f64,
     rows: usize,
-    content: &'a [u8],
+    content: Bytes<'a>,
 }
 
 fn damaged(value: &str) -> Error {
     Damaged::new("frame", value, "a whole frame of version 1").into()
 }
 
-fn number(bytes: &[u8]) -> u64 {
-    bytes.iter().rev().fold(0, |sum, byte| sum << 8 | u64::from(*byte))
-}
-
 fn parts(frame: &[u8]) -> Result<Parts<'_>, Error> {
     let short = || damaged("of fewer than 24 bytes");
     let (rest, checksum) = frame.split_last_chunk::<4>().ok_or_else(short)?;
-    let (head, content) = rest.split_first_chunk::<HEAD>().ok_or_else(short)?;
-    ensure!(head[..3] == MAGIC && head[3] <= HALVES, damaged("of another beginning"));
+    ensure!(rest.len() >= HEAD, short());
+    let mut content = Bytes(rest);
+    let (magic, kind) = (content.array()?, content.byte()?);
+    ensure!(magic == MAGIC && kind <= HALVES, damaged("of another beginning"));
     ensure!(crc32fast::hash(rest) == u32::from_le_bytes(*checksum), damaged("of another checksum"));
+    let bound = content.f64()?;
     let large = || damaged("of more rows than memory");
-    let rows = usize::try_from(number(&head[12..20])).map_err(|_| large())?;
+    let rows = usize::try_from(u64::from_le_bytes(content.array()?)).map_err(|_| large())?;
     // A few bytes may stand for any number of rows: memory that is not there must not end the program.
     let mut room: Vec<f64> = Vec::new();
     room.try_reserve_exact(rows).map_err(|_| large())?;
     Ok(Parts {
-        kind: head[3],
-        bound: f64::from_bits(number(&head[4..12])),
+        kind,
+        bound,
         rows,
         content,
     })
@@ -235,36 +233,28 @@ pub fn rows(frame: &[u8]) -> Result<usize, Error> {
 /// # Errors
 /// If the bytes are no whole frame with the right checksum, or no writer wrote its block.
 pub fn decode(frame: &[u8]) -> Result<Values, Error> {
-    let Parts {
-        kind,
-        bound,
-        rows,
-        content,
-    } = parts(frame)?;
-    let plain = BlockCodec::lossless();
+    let parts = parts(frame)?;
+    let codec = match parts.kind {
+        WITHIN => BlockCodec::new(parts.bound)?,
+        _ => BlockCodec::lossless(),
+    };
+    let read = |block: &[u8]| codec.decode(block, parts.rows);
     let whole = |x: f64| (x.fract() == 0.0 && x.abs() <= WHOLE as f64).then_some(x as i64);
-    let not_whole = || damaged("of integers with numbers that are none");
-    Ok(match kind {
-        DOUBLES => Values::Doubles(plain.decode(content, rows)?),
-        WITHIN => Values::Doubles(BlockCodec::new(bound)?.decode(content, rows)?),
-        SINGLES => Values::Singles(plain.decode(content, rows)?.into_iter().map(|x| x as f32).collect()),
-        INTEGERS => {
-            let samples = plain.decode(content, rows)?.into_iter().map(whole);
-            Values::Integers(samples.collect::<Option<_>>().ok_or_else(not_whole)?)
-        }
+    let integers = |found: Option<Vec<i64>>| found.ok_or_else(|| damaged("of integers with numbers that are none"));
+    let mut content = parts.content;
+    Ok(match parts.kind {
+        DOUBLES | WITHIN => Values::Doubles(read(content.0)?),
+        SINGLES => Values::Singles(read(content.0)?.into_iter().map(|x| x as f32).collect()),
+        INTEGERS => Values::Integers(integers(read(content.0)?.into_iter().map(whole).collect())?),
         _ => {
-            let no_length = || damaged("without the length of its first block");
-            let (length, blocks) = content.split_first_chunk::<8>().ok_or_else(no_length)?;
-            let length = usize::try_from(number(length)).unwrap_or(usize::MAX);
-            let long = || damaged("with a first block that is longer than itself");
-            let (high, low) = blocks.split_at_checked(length).ok_or_else(long)?;
-            let (high, low) = (plain.decode(high, rows)?, plain.decode(low, rows)?);
-            let joined = high.into_iter().zip(low).map(|(high, low)| {
+            let length = u64::from_le_bytes(content.array()?);
+            let high = read(content.take(usize::try_from(length).unwrap_or(usize::MAX))?)?;
+            let joined = high.into_iter().zip(read(content.0)?).map(|(high, low)| {
                 let (high, low) = (whole(high)?, whole(low)?);
                 let fits = i32::try_from(high).is_ok() && (0..=LOW).contains(&low);
                 fits.then_some(high << 32 | low)
             });
-            Values::Integers(joined.collect::<Option<_>>().ok_or_else(not_whole)?)
+            Values::Integers(integers(joined.collect())?)
         }
     })
 }

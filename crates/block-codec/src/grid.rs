@@ -43,11 +43,15 @@ pub(crate) enum Grid {
     Circle { period: f64, cells: i64 },
 }
 
-/// The integer `digits` with `sample == digits / ten` to the last bit, if there is one.
+/// The integer `digits` with `sample == digits / ten` to the last bit, or that rounded to single precision, if there is one.
 #[inline(always)]
-fn digits(sample: f64, ten: f64) -> Option<i64> {
+fn digits(sample: f64, ten: f64, is_single: bool) -> Option<i64> {
     let whole = (sample * ten).round();
-    (whole.abs() < LARGEST_DIGITS && (whole / ten).to_bits() == sample.to_bits()).then_some(whole as i64)
+    let (value, limit) = match is_single {
+        true => (f64::from((whole / ten) as f32), LARGEST_SINGLE_DIGITS),
+        false => (whole / ten, LARGEST_DIGITS),
+    };
+    (whole.abs() < limit && value.to_bits() == sample.to_bits()).then_some(whole as i64)
 }
 
 /// Number of samples that are looked at before the loop may end.
@@ -65,14 +69,6 @@ fn have_digits(samples: &[f64], ten: f64) -> bool {
     })
 }
 
-/// The integer `digits` with `sample == digits / ten` rounded to single precision, if there is one.
-#[inline(always)]
-fn single_digits(sample: f64, ten: f64) -> Option<i64> {
-    let whole = (sample * ten).round();
-    let rounded = f64::from((whole / ten) as f32);
-    (whole.abs() < LARGEST_SINGLE_DIGITS && rounded.to_bits() == sample.to_bits()).then_some(whole as i64)
-}
-
 fn greatest_common_divisor(mut a: i64, mut b: i64) -> i64 {
     while b != 0 {
         (a, b) = (b, a % b);
@@ -80,67 +76,37 @@ fn greatest_common_divisor(mut a: i64, mut b: i64) -> i64 {
     a.abs()
 }
 
-/// The largest number of which all these are multiples; 0 if they are all 0.
-fn common_unit(numbers: impl Iterator<Item = i64>) -> i64 {
-    let mut unit = 0;
-    for number in numbers {
-        unit = greatest_common_divisor(unit, number);
-        if unit == 1 {
-            break;
-        }
-    }
-    unit
-}
-
 impl Grid {
-    /// The decimal grid that fits all samples, if there is one. `delta` is zero if samples must be exact.
-    pub(crate) fn decimal(samples: &[f64], delta: f64) -> Option<Self> {
-        let decimals = (0..DECIMALS).find(|decimals| {
-            let ten = TENS[usize::from(*decimals)];
-            have_digits(samples, ten)
-        })?;
-        let ten = TENS[usize::from(decimals)];
-        let width = Self::width(delta, ten)?;
-        let plain = Self::Decimal {
-            decimals,
-            width,
-            phase: 0,
+    /// The grid of decimal numbers, or of decimal numbers that were rounded to single precision, that fits all samples, if there is one.
+    /// `delta` is zero if samples must be exact, as those of single precision.
+    pub(crate) fn decimal(samples: &[f64], delta: f64, is_single: bool) -> Option<Self> {
+        let fits = |ten: f64| match is_single {
+            true => samples.iter().all(|x| digits(*x, ten, true).is_some()),
+            false => have_digits(samples, ten),
         };
+        let decimals = (0..DECIMALS).find(|decimals| fits(TENS[usize::from(*decimals)]))?;
+        let ten = TENS[usize::from(decimals)];
+        let (width, phase) = (Self::width(delta, ten)?, 0);
+        let plain = Self::Decimal { decimals, width, phase };
         if width > 1 {
             return Some(plain);
         }
-        let mut all = samples.iter().filter_map(|x| digits(*x, ten));
+        let mut all = samples.iter().filter_map(|x| digits(*x, ten, is_single));
         let origin = all.next()?;
         // If all samples are multiples of a larger unit (for example an ADC step in millivolts), count in that unit.
-        let unit = common_unit(all.map(|digits| digits - origin));
-        Some(if unit <= 1 {
-            plain
-        } else {
-            Self::Stepped {
-                decimals,
-                unit,
-                origin,
-                is_single: false,
-            }
-        })
-    }
-
-    /// The grid of decimal numbers that were rounded to single precision, if it fits all samples.
-    pub(crate) fn single(samples: &[f64]) -> Option<Self> {
-        let decimals = (0..DECIMALS).find(|decimals| {
-            let ten = TENS[usize::from(*decimals)];
-            samples.iter().all(|x| single_digits(*x, ten).is_some())
-        })?;
-        let ten = TENS[usize::from(decimals)];
-        let mut all = samples.iter().filter_map(|x| single_digits(*x, ten));
-        let origin = all.next()?;
-        let unit = common_unit(all.map(|digits| digits - origin)).max(1);
-        Some(Self::Stepped {
+        let mut unit = 0;
+        while unit != 1
+            && let Some(digits) = all.next()
+        {
+            unit = greatest_common_divisor(unit, digits - origin);
+        }
+        let stepped = Self::Stepped {
             decimals,
-            unit,
+            unit: unit.max(1),
             origin,
-            is_single: true,
-        })
+            is_single,
+        };
+        Some(if unit > 1 || is_single { stepped } else { plain })
     }
 
     /// Number of neighbouring multiples of `1 / ten` within `delta` of their middle; `None` if it is too large.
@@ -264,13 +230,8 @@ impl Grid {
             Self::Decimal { decimals, width, phase } => {
                 let moved = width - 1 + 2 * Self::digits_moved(*width, *phase);
                 // Twice the middle in digits, because the middle may be half of a digit.
-                let short = width
-                    .checked_mul(index)
-                    .and_then(|middle| middle.checked_mul(2)?.checked_add(moved));
-                let twice = match short {
-                    Some(twice) => twice as f64,
-                    None => (2 * i128::from(*width) * i128::from(index) + i128::from(moved)) as f64,
-                };
+                let twice = 2 * i128::from(*width) * i128::from(index) + i128::from(moved);
+                let twice = i64::try_from(twice).map_or(twice as f64, |twice| twice as f64);
                 0.5 * twice / TENS[usize::from(*decimals)]
             }
             Self::Stepped {
@@ -344,12 +305,7 @@ impl Grid {
                 origin,
                 is_single,
             } => {
-                let ten = TENS[usize::from(*decimals)];
-                let digits = if *is_single {
-                    single_digits(sample, ten)
-                } else {
-                    digits(sample, ten)
-                }?;
+                let digits = digits(sample, TENS[usize::from(*decimals)], *is_single)?;
                 let offset = i128::from(digits) - i128::from(*origin);
                 i64::try_from(offset.div_euclid(i128::from(*unit))).ok()
             }

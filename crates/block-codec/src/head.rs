@@ -43,28 +43,21 @@ pub(crate) enum Coding {
     Wrapped,
 }
 
-/// Of each coding of indices its bits in the first byte, and its flag in the second one.
-const CODINGS: &[(Coding, u8, u8)] = &[
-    (Coding::Models, 0, 0),
-    (Coding::Pco, 1, 0),
-    (Coding::Wrapped, 1, WRAPPED),
-    (Coding::Levels, 2, 0),
-    (Coding::TabledLevels, 2, TABLED),
-    (Coding::StoredLevels, 2, STORED),
-    (Coding::Counts, 3, 0),
-    (Coding::Tables, 3, TABLED),
-    (Coding::Stored, 3, STORED),
+/// Of each coding its bits in the first byte, of indices and of samples, and its flag in the second one. `NONE`: there is none.
+const CODINGS: &[(Coding, [u8; 2], u8)] = &[
+    (Coding::Models, [0, NONE], 0),
+    (Coding::Pco, [1, 1], 0),
+    (Coding::Wrapped, [1, NONE], WRAPPED),
+    (Coding::Wrapped, [NONE, 3], 0),
+    (Coding::Levels, [2, 0], 0),
+    (Coding::TabledLevels, [2, 0], TABLED),
+    (Coding::StoredLevels, [2, 0], STORED),
+    (Coding::Counts, [3, NONE], 0),
+    (Coding::Tables, [3, NONE], TABLED),
+    (Coding::Stored, [3, NONE], STORED),
+    (Coding::Raw, [NONE, 2], 0),
 ];
-
-/// The same of samples.
-const CODINGS_OF_SAMPLES: &[(Coding, u8, u8)] = &[
-    (Coding::Levels, 0, 0),
-    (Coding::TabledLevels, 0, TABLED),
-    (Coding::StoredLevels, 0, STORED),
-    (Coding::Pco, 1, 0),
-    (Coding::Raw, 2, 0),
-    (Coding::Wrapped, 3, 0),
-];
+const NONE: u8 = 255;
 
 /// The head of a block.
 pub(crate) struct Head<'a> {
@@ -148,29 +141,26 @@ impl BlockCodec {
     /// The head of a block of so many rows; a reader may be given any other one.
     fn code_head<F: Fields>(&self, fields: &mut F, own: &Head<'_>, rows: usize) -> Result<Head<'static>, Damaged> {
         let (kind, flags) = own.grid.as_ref().map_or((SAMPLES, 0), Grid::form);
-        let codings = |kind| if kind == SAMPLES { CODINGS_OF_SAMPLES } else { CODINGS };
-        let written = codings(kind).iter().find(|(coding, ..)| *coding == own.coding);
-        let (bits, form) = written.map_or((0, 0), |(_, bits, form)| (*bits, *form));
+        // The bits in the first byte, and the flag in the second one, of codings of this kind.
+        let codings = |kind| {
+            let of_kind =
+                move |(coding, bits, form): &(_, [u8; 2], _)| (*coding, bits[usize::from(kind == SAMPLES)], *form);
+            CODINGS.iter().map(of_kind).filter(|(_, bits, _)| *bits != NONE)
+        };
+        let written = codings(kind).find(|(coding, ..)| *coding == own.coding);
+        let (_, bits, form) = written.unwrap_or((own.coding, 0, 0));
         let second = flags | form | u8::from(!own.exceptions.is_empty());
         let head = fields.byte(kind | bits << 4 | u8::from(own.joint) << 6 | u8::from(second != 0) << 7)?;
         let second = if head & 128 == 0 { 0 } else { fields.byte(second)? };
         let (kind, joint, form) = (head & 15, head & 64 != 0, second & (WRAPPED | TABLED | STORED));
-        let found = codings(kind)
-            .iter()
-            .find(|(_, bits, own)| (head >> 4 & 3, form) == (*bits, *own));
-        let Some((coding, ..)) = found.copied() else {
-            return Err(Damaged::new("head", format!("{head}, {second}"), "a grid and a coding that belong together"));
-        };
-        if (head & 128 != 0 && second == 0)
-            || (kind == SAMPLES && (second != form || (joint && coding != Coding::Levels)))
-            || (joint && form & (TABLED | STORED) != 0)
-        {
-            return Err(Damaged::new(
-                "second byte",
-                second,
-                "exceptions, steps, an anchor or a phase, and a grid or coding that has them",
-            ));
-        }
+        let found = codings(kind).find(|(_, bits, own)| (head >> 4 & 3, form) == (*bits, *own));
+        let expected = "a grid and a coding that belong together";
+        let (coding, ..) = found.ok_or_else(|| Damaged::new("head", format!("{head}, {second}"), expected))?;
+        let is_usual = (head & 128 == 0 || second != 0)
+            && (kind != SAMPLES || (second == form && (!joint || coding == Coding::Levels)))
+            && (!joint || form & (TABLED | STORED) == 0);
+        let expected = "exceptions, steps, an anchor or a phase, and a grid or coding that has them";
+        ensure!(is_usual, Damaged::new("second byte", second, expected));
         let grid = match kind {
             SAMPLES => None,
             kind => Some(self.code_grid(fields, own.grid.as_ref(), (kind, second))?),

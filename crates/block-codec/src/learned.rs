@@ -25,11 +25,12 @@
 use crate::arithmetic::{Coder, Reader};
 use crate::bytes::{Bytes, unzigzag};
 use crate::counts::Counts;
-use crate::error::Damaged;
+use crate::error::{Damaged, ensure};
 use crate::indices::code_first;
 use crate::rows::{LARGEST, code_all};
-use crate::stored::order::Order;
-use crate::stored::words::{HEAD_BITS, LANES, PAD_BITS, Words, cut_off, fill_slots, stretches};
+use crate::stored::alphabet::size_class;
+use crate::stored::order::{Order, Sums, VALUES};
+use crate::stored::words::{HEAD_BITS, LANES, Words, fill_slots, stretches};
 
 /// Number of differences that are coded by counts.
 const WARM: usize = 256;
@@ -102,13 +103,7 @@ impl Lane {
         let is_cell = (1..RANGES).contains(&symbol);
         let size = if is_cell { symbol.abs_diff(ZERO) } else { SYMBOLS };
         let is_up = if is_cell { symbol > ZERO } else { symbol % 2 == 1 };
-        let class = match size {
-            0..=4 => size,
-            5..=6 => 5,
-            7..=9 => 6,
-            10..=13 => 7,
-            _ => 8,
-        };
+        let class = size_class(size);
         self.class = if is_up { 8 + class } else { 8 - class };
         let was_zero = self.size == 0;
         self.rests = if was_zero && size == 0 { self.rests + 1 } else { 0 };
@@ -257,9 +252,7 @@ fn widths(counts: &[u16; SYMBOLS], common: &[i32; SYMBOLS]) -> [u32; SYMBOLS] {
 
 /// The indices of a block without its head.
 pub(crate) fn read(bytes: &[u8], rows: usize) -> Result<Vec<i64>, Damaged> {
-    if rows < LEARNED_ROWS {
-        return Err(Damaged::new("block", format!("tables for {rows} rows"), "2048 rows or more"));
-    }
+    ensure!(rows >= LEARNED_ROWS, Damaged::new("block", format!("tables for {rows} rows"), "2048 rows or more"));
     let mut bytes = Bytes(bytes);
     let head = bytes.varint()?;
     let warm = bytes.take(usize::try_from(head >> HEAD_BITS).unwrap_or(usize::MAX))?;
@@ -267,21 +260,25 @@ pub(crate) fn read(bytes: &[u8], rows: usize) -> Result<Vec<i64>, Damaged> {
     let (first, mut has_rests) = code_first(&mut reader, None, false)?;
     let second = reader.raw(0, 1) == 1;
     let mut low = reader.raw(0, LOW_FIELD) as u32;
-    let mut order = if second { Order::Second } else { Order::First };
+    let (mut kind, mut centre) = (u8::from(second), 0);
     let of_values = low >= OF_VALUES;
     if of_values {
-        let (centre, rests) = code_first(&mut reader, None, false)?;
+        let (found, rests) = code_first(&mut reader, None, false)?;
         has_rests |= rests || second;
-        (order, low) = (Order::Values { centre }, low - OF_VALUES);
+        (kind, centre, low) = (VALUES, found, low - OF_VALUES);
     }
-    if has_rests || low > MOST_LOW {
-        let expected = "at most 45, or of values, behind a first index of at most 2^46 in size";
-        return Err(Damaged::new("low bits", low, expected));
-    }
+    let expected = "at most 45, or of values, behind a first index of at most 2^46 in size";
+    ensure!(!has_rests && low <= MOST_LOW, Damaged::new("low bits", low, expected));
+    let order = Order { kind, centre };
     let mut indices = code_all(&mut reader, Counts::new(first, second), None, WARM + 1, None)?;
     reader.finish()?;
     let mut tables = Tables::new(&order.differences(&indices), of_values, low);
-    let (mut states, mut words) = Words::begun(bytes, head >> PAD_BITS & 3)?;
+    let push = |indices: &mut Vec<i64>, mut found: Vec<i64>| {
+        let mut sums = Sums::START;
+        found.iter_mut().for_each(|own| *own = sums.add(kind, *own));
+        order.push(indices, &found)
+    };
+    let (mut states, mut words) = Words::begun(bytes, head)?;
     let rest = rows - indices.len();
     let tail = (TAIL_BITS * WARM / (8 * warm.len().max(1))).clamp(8, 8 + rest / 16);
     for length in stretches(rest - tail.min(rest)) {
@@ -295,19 +292,10 @@ pub(crate) fn read(bytes: &[u8], rows: usize) -> Result<Vec<i64>, Damaged> {
             }
         }
         words.check(&states)?;
-        order.push_indices(&mut indices, &found)?;
+        push(&mut indices, found)?;
     }
-    let late = words.late(&states)?;
-    let (mut words, mut state) = (Words::new(&late), states[0]);
-    let pads = words.pads(&mut state, head);
     let mut lane = Lane::START;
-    let found: Vec<i64> = (indices.len()..rows)
-        .map(|_| tables.read(&mut lane, &mut state, &mut words))
-        .collect();
-    order.push_indices(&mut indices, &found)?;
-    if words.is_ended(pads, state) {
-        Ok(indices)
-    } else {
-        Err(cut_off())
-    }
+    let found = words.tail(&states, head, rows - indices.len(), |state, words| tables.read(&mut lane, state, words))?;
+    push(&mut indices, found)?;
+    Ok(indices)
 }

@@ -64,7 +64,7 @@ pub(crate) fn levels(keys: impl ExactSizeIterator<Item = u64> + Clone, effort: E
         Effort::Thorough => (most, most),
         Effort::Fast => (most.min(FEW_LEVELS), FREE_LEVELS),
     };
-    if effort == Effort::Thorough && are_dense(keys.clone()) {
+    if are_dense(keys.clone()) {
         return None;
     }
     // Number of the level from one on, in the order of the rows; zero is a free slot, of which at least half are.
@@ -93,9 +93,6 @@ pub(crate) fn levels(keys: impl ExactSizeIterator<Item = u64> + Clone, effort: E
     let mut order: Vec<usize> = (0..levels.len()).collect();
     order.sort_unstable_by_key(|number| levels[*number]);
     let sorted: Vec<u64> = order.iter().map(|number| levels[*number]).collect();
-    if is_dense(&sorted) {
-        return None;
-    }
     let mut ranks = vec![0; order.len()];
     order
         .iter()
@@ -105,26 +102,19 @@ pub(crate) fn levels(keys: impl ExactSizeIterator<Item = u64> + Clone, effort: E
     Some((sorted, numbers))
 }
 
-/// The same of keys in any order and number; also `false` if they are too far apart to be marked one by one.
+/// Whether at least every second key from the lowest to the highest is a level.
 fn are_dense(keys: impl ExactSizeIterator<Item = u64> + Clone) -> bool {
     let ends = |(low, high): (u64, u64), key: u64| (low.min(key), high.max(key));
     let (low, high) = keys.clone().fold((u64::MAX, 0), ends);
     let distance = high.saturating_sub(low);
-    if distance >= 2 * keys.len() as u64 {
+    // There are at most as many levels as keys, of which there is one at least.
+    if distance >= 2 * keys.len().max(1) as u64 {
         return false;
     }
     let mut marks = vec![0_u8; distance as usize + 1];
     keys.for_each(|key| marks[(key - low) as usize] = 1);
     let levels: u64 = marks.into_iter().map(u64::from).sum();
     levels < 2 || distance < 2 * levels
-}
-
-/// Whether at least every second key from the lowest to the highest is a level.
-fn is_dense(levels: &[u64]) -> bool {
-    match levels {
-        [first, .., last] => last - first < 2 * levels.len() as u64,
-        _ => true,
-    }
 }
 
 /// Codes the list of levels: `wanted` at the writer, `None` at the reader.
@@ -180,17 +170,14 @@ pub(crate) fn code<C: Coder>(
     let first = coder.raw(first, u64::BITS - highest.leading_zeros()) as i64;
     let numbers = wanted.map(|(_, numbers)| numbers.as_slice());
     let numbers = code_rest(coder, by_models.then_some(false), None, first, numbers, rows, others)?;
-    let level = |number: &i64| {
-        usize::try_from(*number)
-            .ok()
-            .and_then(|number| levels.get(number).copied())
-    };
-    let levels = numbers.iter().map(level).collect::<Option<Vec<u64>>>();
-    levels.ok_or_else(beyond_the_list)
+    at_numbers(&levels, &numbers)
 }
 
-fn beyond_the_list() -> Damaged {
-    Damaged::new("level", "beyond the last one", "one of the list")
+/// The levels of these numbers.
+fn at_numbers(levels: &[u64], numbers: &[i64]) -> Result<Vec<u64>, Damaged> {
+    let level = |number: &i64| levels.get(usize::try_from(*number).ok()?).copied();
+    let levels = numbers.iter().map(level).collect::<Option<_>>();
+    levels.ok_or_else(|| Damaged::new("level", "beyond the last one", "one of the list"))
 }
 
 /// Appends the code of keys with these levels to the head of a block.
@@ -224,10 +211,7 @@ pub(crate) fn read_tabled(
     let mut bytes = Bytes(bytes);
     let length = bytes.count(usize::MAX, "length of levels")?;
     let levels = Reader::all(bytes.take(length)?, |coder| code_levels(coder, None, rows))?;
-    let numbers = read(bytes.0, rows)?;
-    let level = |number: i64| usize::try_from(number).ok().and_then(|number| levels.get(number));
-    let levels = numbers.into_iter().map(|number| level(number).copied());
-    levels.collect::<Option<_>>().ok_or_else(beyond_the_list)
+    at_numbers(&levels, &read(bytes.0, rows)?)
 }
 
 #[cfg(test)]

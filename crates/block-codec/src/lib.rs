@@ -105,16 +105,13 @@ impl BlockCodec {
     ///
     /// # Errors
     /// If `period` is not positive and finite, or above `2^40` times the bound.
-    pub fn on_circle(self, period: f64) -> Result<Self, Error> {
+    pub fn on_circle(mut self, period: f64) -> Result<Self, Error> {
         ArgumentError::positive("period", period)?;
-        if self.is_lossless() {
-            return Ok(self);
+        if !self.is_lossless() {
+            ensure!(period / self.delta <= MOST_CELLS, "period", period, "at most 2^40 times the bound");
+            self.period = Some(period);
         }
-        ensure!(period / self.delta <= MOST_CELLS, "period", period, "at most 2^40 times the bound");
-        Ok(Self {
-            period: Some(period),
-            ..self
-        })
+        Ok(self)
     }
 
     /// A codec that returns every sample to the last bit.
@@ -134,12 +131,5 @@ impl BlockCodec {
 
     fn is_lossless(&self) -> bool {
         self.delta == 0.0
-    }
-}
-
-fn check_rows(rows: usize, others: &[&[f64]]) -> Result<(), ArgumentError> {
-    match others.iter().find(|other| other.len() != rows) {
-        Some(other) => Err(ArgumentError::new("others", other.len(), format!("{rows} rows"))),
-        None => Ok(()),
     }
 }

@@ -1,7 +1,7 @@
 //! The loop over rows that writer and reader share, for any coder of indices.
 
 use crate::arithmetic::Coder;
-use crate::error::{Damaged, ensure};
+use crate::error::{ArgumentError, Damaged, ensure};
 use crate::vectors::vectorised_narrow;
 
 /// Largest size of an index: sums of a few fit into an `i64`.
@@ -14,7 +14,14 @@ pub(crate) struct Others<'a> {
 }
 
 impl<'a> Others<'a> {
-    pub(crate) fn new(others: &[&'a [f64]]) -> Self {
+    /// Of these columns, if there are any.
+    ///
+    /// # Errors
+    /// If one has another number of rows.
+    pub(crate) fn new(others: &[&'a [f64]], rows: usize) -> Result<Option<Self>, ArgumentError> {
+        for other in others {
+            ensure!(other.len() == rows, "others", other.len(), format!("{rows} rows"));
+        }
         let columns = others.iter().take(JOINT_COLUMNS).map(|column| {
             let sizes = column.windows(2).map(|pair| (pair[1] - pair[0]).abs());
             let (mut sum, mut count) = (0.0, 0.0);
@@ -24,9 +31,8 @@ impl<'a> Others<'a> {
             }
             (*column, if sum > 0.0 { count / sum } else { 0.0 })
         });
-        Self {
-            columns: columns.collect(),
-        }
+        let columns: Vec<_> = columns.collect();
+        Ok((!columns.is_empty()).then_some(Self { columns }))
     }
 
     fn at(&self, row: usize) -> [f64; JOINT_COLUMNS] {

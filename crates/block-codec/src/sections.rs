@@ -6,7 +6,7 @@
 //! ```
 
 use crate::bytes::{Bytes, push_varint};
-use crate::groups::joined;
+use crate::groups::{joined, sums};
 use crate::head::{SAMPLES, STORED, TABLED};
 use crate::vectors::narrow;
 use crate::{BlockCodec, Error};
@@ -27,47 +27,24 @@ const CLASSES: usize = 64;
 /// Bits that a section costs in addition to its rows.
 const BITS_OF_SECTION: f32 = 1200.0;
 
-/// Pieces that belong together.
-struct Group {
-    rows: usize,
-    counts: [u16; CLASSES],
-    bits: f32,
+/// How often each class of differences occurs in the runs of a piece that are counted.
+#[inline(always)]
+fn counts(piece: &[i64]) -> [u32; CLASSES] {
+    let mut counts = [0; CLASSES];
+    for run in piece.chunks(EVERY) {
+        for pair in run[..run.len().min(RUN)].windows(2) {
+            counts[class(pair[1].wrapping_sub(pair[0]))] += 1;
+        }
+    }
+    counts
 }
 
-impl Group {
-    #[inline(always)]
-    fn new(rows: usize, counts: [u16; CLASSES]) -> Self {
-        let (mut terms, mut sum) = ([0.0; CLASSES], 0);
-        for (term, count) in terms.iter_mut().zip(&counts) {
-            let number = f32::from((*count).max(1));
-            *term = number * log2(number);
-            sum += *count;
-        }
-        // The bits of all rows, of which some are counted.
-        let sum = f32::from(sum.max(1));
-        let bits = rows as f32 * (log2(sum) - terms.iter().sum::<f32>() / sum);
-        Self { rows, counts, bits }
-    }
-
-    #[inline(always)]
-    fn of(piece: &[i64]) -> Self {
-        let mut counts = [0; CLASSES];
-        for run in piece.chunks(EVERY) {
-            for pair in run[..run.len().min(RUN)].windows(2) {
-                counts[class(pair[1].wrapping_sub(pair[0]))] += 1;
-            }
-        }
-        Self::new(piece.len(), counts)
-    }
-
-    #[inline(always)]
-    fn joined(&self, other: &Self) -> Self {
-        let mut counts = self.counts;
-        for (own, other) in counts.iter_mut().zip(&other.counts) {
-            *own += other;
-        }
-        Self::new(self.rows + other.rows, counts)
-    }
+/// The bits of all rows, of which some are counted.
+#[inline(always)]
+fn bits(rows: usize, counts: &[u32; CLASSES]) -> f32 {
+    let (sum, logs) = sums(counts);
+    let sum = sum.max(1.0);
+    rows as f32 * (log2(sum) - logs / sum)
 }
 
 /// A class of differences: small ones have their own, of larger ones those of one length in bits share one.
@@ -84,9 +61,9 @@ fn class(step: i64) -> usize {
 /// The rows of each section; one section if the signal is of one kind.
 pub(crate) fn sections(numbers: &[i64]) -> Vec<usize> {
     narrow!({
-        let pieces = numbers.chunks(PIECE).map(Group::of).collect();
-        let groups = joined(pieces, |group| group.bits, -BITS_OF_SECTION, Group::joined);
-        groups.iter().map(|group| group.rows).collect()
+        let pieces = numbers.chunks(PIECE).map(|piece| (piece.len(), counts(piece)));
+        let groups = joined(pieces, bits, -BITS_OF_SECTION);
+        groups.iter().map(|group| group.size).collect()
     })
 }
 
@@ -116,9 +93,9 @@ impl BlockCodec {
             let left = rows - samples.len();
             let own = bytes.count(left.saturating_sub(1), "rows of a section")?.max(1);
             let length = bytes.count(usize::MAX, "length of a section")?;
-            samples.extend(self.decode_section(bytes.take(length)?, own, &[])?);
+            samples.extend(self.decode_section(bytes.take(length)?, own, None)?);
         }
-        samples.extend(self.decode_section(bytes.0, rows - samples.len(), &[])?);
+        samples.extend(self.decode_section(bytes.0, rows - samples.len(), None)?);
         Ok(samples)
     }
 }

@@ -20,7 +20,7 @@ use crate::grid::Grid;
 use crate::head::{PHASE, SINGLE, STEPS};
 use crate::indices::{RESTS_ROWS, code_rest};
 use crate::rows::{LARGEST, Others};
-use crate::{BlockCodec, Effort, Error, check_rows};
+use crate::{BlockCodec, Effort, Error};
 
 /// Probabilities, in units of `2^-16`, that a block uses the start, and that it is coded by models.
 const WITH_START: u32 = 65_280;
@@ -128,14 +128,14 @@ impl BlockCodec {
     /// # Errors
     /// As [`encode_with`](Self::encode_with).
     pub fn encode_from(&self, start: &Start, samples: &[f64], others: &[&[f64]]) -> Result<StartedBlock, Error> {
-        check_rows(samples.len(), others)?;
+        let others = Others::new(others, samples.len())?;
         let mut found: Vec<StartedBlock> = Vec::new();
         let (indices, exceptions) = self.indices(&start.grid, samples);
         let is_tabled = self.is_tabled(samples.len());
         if exceptions.is_empty() && !samples.is_empty() && !is_tabled {
             found.push(self.started(start, &indices, None)?);
-            if self.effort == Effort::Thorough && !others.is_empty() {
-                found.push(self.started(start, &indices, Some(&Others::new(others)))?);
+            if self.effort == Effort::Thorough && others.is_some() {
+                found.push(self.started(start, &indices, others.as_ref())?);
             }
         }
         // Tables are in blocks of their own only.
@@ -148,7 +148,7 @@ impl BlockCodec {
             .is_none_or(|block| block.bytes.len() > fine * samples.len() / 8);
         // If the start does not fit the block, a block of its own is shorter.
         if is_fine || !self.grid(samples).is_some_and(|grid| grid.is_like(&start.grid)) {
-            let alone = self.encode_with(samples, others)?;
+            let alone = self.encode_beside(samples, others.as_ref())?;
             found.push(StartedBlock {
                 joint: alone.first().is_some_and(|head| head & 64 != 0),
                 bytes: [&[ALONE], alone.as_slice()].concat(),
@@ -191,11 +191,10 @@ impl BlockCodec {
         rows: usize,
         others: &[&[f64]],
     ) -> Result<Vec<i64>, Error> {
-        check_rows(rows, others)?;
+        let others = Others::new(others, rows)?;
         if rows == 0 {
             return Ok(Vec::new());
         }
-        let others = (!others.is_empty()).then(|| Others::new(others));
         Ok(self.code(coder, start, wanted, rows, others.as_ref())?)
     }
 
@@ -226,11 +225,10 @@ impl BlockCodec {
     /// # Errors
     /// As [`decode_with`](Self::decode_with).
     pub fn decode_from(&self, start: &Start, bytes: &[u8], rows: usize, others: &[&[f64]]) -> Result<Vec<f64>, Error> {
-        check_rows(rows, others)?;
         if rows == 0 || bytes.first() == Some(&ALONE) {
             return self.decode_with(bytes.get(1..).unwrap_or_default(), rows, others);
         }
-        let others = (!others.is_empty()).then(|| Others::new(others));
+        let others = Others::new(others, rows)?;
         let indices = Reader::all(bytes, |reader| {
             reader.bit(WITH_START, true);
             self.code(reader, start, None, rows, others.as_ref())

@@ -1,7 +1,7 @@
 //! Minimum, maximum, number and mean of values, as the index has them of each block.
 
 use crate::block::Cells;
-use crate::error::Damage;
+use crate::error::{Damage, ensure};
 use crate::ranges::wider;
 use crate::wire::Fields;
 
@@ -117,11 +117,8 @@ impl Aggregate {
         } else {
             (fields.f64(own.high)?, fields.f64(own.mean)?)
         };
-        if low.is_finite() && high.is_finite() && low <= mean && mean <= high {
-            Ok(Self { count, low, high, mean })
-        } else {
-            Err(damaged)
-        }
+        ensure!(low.is_finite() && high.is_finite() && low <= mean && mean <= high, damaged);
+        Ok(Self { count, low, high, mean })
     }
 }
 

@@ -55,8 +55,8 @@ pub(crate) fn roll_back(file: &mut File, path: &Path, offset: u64, tail: &[u8]) 
     restore().map_err(Error::io("restore"))
 }
 
-/// An append that may be undone. Dropped before [`commit`](Self::commit), it puts the recording back.
-#[derive(Debug)]
+/// An append that may be undone. Dropped before [`commit`](Self::commit), it puts the recording back. The default has nothing to undo.
+#[derive(Debug, Default)]
 pub(crate) struct Append(Option<Open>);
 
 /// An append to a file, and the path of the recording.
@@ -68,7 +68,7 @@ struct Open {
 }
 
 #[derive(Debug)]
-enum State {
+pub(crate) enum State {
     /// Nothing is overwritten yet; blocks are to be written from this offset on.
     Planned(u64),
     /// The bytes from this offset on, which are these, are overwritten.
@@ -78,22 +78,8 @@ enum State {
 }
 
 impl Append {
-    /// Nothing to undo.
-    pub(crate) fn none() -> Self {
-        Self(None)
-    }
-
-    /// An append to this file from `offset` on.
-    pub(crate) fn planned(file: File, path: &Path, offset: u64) -> Self {
-        Self::new(file, path, State::Planned(offset))
-    }
-
-    /// An append to a copy beside; `locked` holds the lock of the recording.
-    pub(crate) fn copy(file: File, locked: File, path: &Path) -> Self {
-        Self::new(file, path, State::Copy(locked))
-    }
-
-    fn new(file: File, path: &Path, state: State) -> Self {
+    /// An append to this file, which is the recording or a copy beside it.
+    pub(crate) fn new(file: File, path: &Path, state: State) -> Self {
         let path = path.to_owned();
         Self(Some(Open { file, path, state }))
     }

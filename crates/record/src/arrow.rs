@@ -9,6 +9,7 @@
 //! | any other | `time`: 64-bit integers, ticks; metadata `decimals` |
 
 use crate::block::{Block, Cells};
+use crate::column::Column;
 use crate::error::{Error, ensure, listed};
 use crate::integers::Integers;
 use crate::recorder::Recorder;
@@ -21,7 +22,6 @@ use arrow_array::types::{
 use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, RecordBatch, make_array};
 use arrow_schema::{DataType, Field, TimeUnit};
 use fewbits_block_codec::ArgumentError;
-use std::collections::HashMap;
 use std::io::Write;
 use std::sync::Arc;
 
@@ -61,26 +61,25 @@ fn retyped(array: &dyn Array, kind: DataType) -> Result<ArrayRef, Error> {
 impl Schema {
     /// The fields of batches of this recording. Units, and the decimals of ticks, are in the metadata.
     pub fn to_arrow(&self) -> arrow_schema::Schema {
+        let field = |name: &str, kind, is_nullable, metadata: Option<(&str, String)>| {
+            let metadata = metadata.into_iter().map(|(key, value)| (key.to_owned(), value));
+            Field::new(name, kind, is_nullable).with_metadata(metadata.collect())
+        };
         let kind = type_of(self.time);
         let time = match self.time {
-            TimeBase::Numbered => Field::new("row", kind, false),
-            TimeBase::Clock { decimals, .. } if kind == DataType::Int64 => {
-                let decimals = HashMap::from([("decimals".to_owned(), decimals.to_string())]);
-                Field::new("time", kind, false).with_metadata(decimals)
+            TimeBase::Numbered => field("row", kind, false, None),
+            TimeBase::Clock { decimals, .. } => {
+                let ticks = (kind == DataType::Int64).then(|| ("decimals", decimals.to_string()));
+                field("time", kind, false, ticks)
             }
-            TimeBase::Clock { .. } => Field::new("time", kind, false),
         };
         let columns = self.columns.iter().map(|column| {
             let kind = match column.integers {
                 None => DataType::Float64,
                 Some(_) => DataType::Int64,
             };
-            let field = Field::new(&column.name, kind, true);
-            if column.unit().is_empty() {
-                field
-            } else {
-                field.with_metadata(HashMap::from([("unit".to_owned(), column.unit().to_owned())]))
-            }
+            let unit = (!column.unit.is_empty()).then(|| ("unit", column.unit.clone()));
+            field(&column.name, kind, true, unit)
         });
         arrow_schema::Schema::new(std::iter::once(time).chain(columns).collect::<Vec<_>>())
     }
@@ -93,10 +92,8 @@ impl Block {
     /// If the block is not of a recording with this schema.
     pub fn to_record_batch(&self, schema: &Schema) -> Result<RecordBatch, Error> {
         let fields = schema.to_arrow();
-        if self.columns.len() != schema.columns.len() {
-            let given = format!("{} columns", self.columns.len());
-            return Err(ArgumentError::new("schema", given, format!("{}", schema.columns.len())).into());
-        }
+        let (given, wanted) = (self.columns.len(), schema.columns.len());
+        ensure!(given == wanted, "schema", format!("{given} columns"), format!("{wanted}"));
         let ticks = Int64Array::from_iter_values(self.ticks.iter().copied());
         let time = retyped(&ticks, type_of(schema.time))?;
         let asked = (0..self.columns.len()).filter(|i| self.columns[*i].len() == self.rows());
@@ -123,15 +120,9 @@ fn array(cells: &[Option<f64>], integers: Option<Integers>) -> ArrayRef {
 
 /// The double nearest to `unscaled 10^-scale`; nothing for more than 53 bits.
 fn decimal(unscaled: i128, scale: i8) -> Option<f64> {
-    let power = 10_f64.powi(i32::from(scale).abs());
+    let (number, power) = (unscaled as f64, 10_f64.powi(i32::from(scale).abs()));
     let exact = unscaled.unsigned_abs() <= MAX_WHOLE as u128;
-    exact.then(|| {
-        if scale < 0 {
-            unscaled as f64 * power
-        } else {
-            unscaled as f64 / power
-        }
-    })
+    exact.then_some(if scale < 0 { number * power } else { number / power })
 }
 
 /// The cells of an array of numbers, `None` for nulls. Decimals become the nearest doubles, durations seconds.
@@ -145,6 +136,7 @@ pub fn cells(name: &str, array: &dyn Array) -> Result<Cells, Error> {
             .map(|cell| cell.map_or(Some(None), |cell| number(cell).map(Some)))
             .collect()
     }
+    let bit = |cell: Option<bool>| cell.map(|yes| f64::from(u8::from(yes)));
     let refuse = |given: String, expected: &str| -> Error { ArgumentError::new("column", given, expected).into() };
     let found = match array.data_type() {
         DataType::Float64 => of::<Float64Type>(array, Some),
@@ -157,13 +149,7 @@ pub fn cells(name: &str, array: &dyn Array) -> Result<Cells, Error> {
         DataType::UInt32 => of::<UInt32Type>(array, |x| Some(x.into())),
         DataType::Int64 => of::<Int64Type>(array, |x| (x.abs() <= MAX_WHOLE).then_some(x as f64)),
         DataType::UInt64 => of::<UInt64Type>(array, |x| (x <= MAX_WHOLE as u64).then_some(x as f64)),
-        DataType::Boolean => Some(
-            array
-                .as_boolean()
-                .iter()
-                .map(|cell| cell.map(|yes| f64::from(u8::from(yes))))
-                .collect(),
-        ),
+        DataType::Boolean => Some(array.as_boolean().iter().map(bit).collect()),
         DataType::Null => Some(vec![None; array.len()]),
         DataType::Decimal32(_, scale) => of::<Decimal32Type>(array, |x| decimal(x.into(), *scale)),
         DataType::Decimal64(_, scale) => of::<Decimal64Type>(array, |x| decimal(x.into(), *scale)),
@@ -181,9 +167,8 @@ pub fn cells(name: &str, array: &dyn Array) -> Result<Cells, Error> {
 fn codes(name: &str, array: &dyn Array, integers: Integers) -> Result<Cells, Error> {
     if *array.data_type() == DataType::Int64 {
         let numbers = array.as_primitive::<Int64Type>().iter();
-        return Ok(numbers
-            .map(|number| number.map(|number| integers.code(number)))
-            .collect());
+        let code = |number: Option<i64>| number.map(|number| integers.code(number));
+        return Ok(numbers.map(code).collect());
     }
     let numbers = cells(name, array)?.into_iter();
     let code = |number: Option<f64>| number.map_or(Some(None), |number| integers.code_of(number).map(Some));
@@ -221,13 +206,8 @@ pub fn ticks(name: &str, array: &dyn Array, decimals: u8) -> Result<Vec<i64>, Er
         _ => scale.filter(|scale| tick % scale == 0).map(|scale| tick / scale),
     };
     let numbers = retyped(array, DataType::Int64)?;
-    let ticks: Option<Vec<i64>> = numbers
-        .as_primitive::<Int64Type>()
-        .values()
-        .iter()
-        .map(scaled)
-        .collect();
-    ticks.ok_or_else(refused)
+    let numbers = numbers.as_primitive::<Int64Type>().values().iter();
+    numbers.map(scaled).collect::<Option<_>>().ok_or_else(refused)
 }
 
 impl<W: Write> Recorder<W> {
@@ -259,15 +239,11 @@ impl<W: Write> Recorder<W> {
                 ticks(name, array(name)?, decimals)?
             }
         };
-        let columns = self
-            .schema()
-            .columns()
-            .iter()
-            .map(|column| match (column.integers, array(column.name())?) {
-                (Some(integers), array) => codes(column.name(), array, integers),
-                (None, array) => cells(column.name(), array),
-            });
-        let columns: Vec<Cells> = columns.collect::<Result<_, _>>()?;
+        let found = |column: &Column| match (column.integers, array(column.name())?) {
+            (Some(integers), array) => codes(column.name(), array, integers),
+            (None, array) => cells(column.name(), array),
+        };
+        let columns: Vec<Cells> = self.schema().columns().iter().map(found).collect::<Result<_, _>>()?;
         self.push_columns(&ticks, &columns)
     }
 }

@@ -97,7 +97,8 @@ impl<R: Read + Seek> Blocks<'_, R> {
         let limit = block::max_bytes(header) as u64 + 16;
         ensure!(entry.bytes <= limit && entry.rows > 0, damaged(Damage::NoBlock));
         let bytes = read_at(&mut self.playback.reader, entry.offset, entry.bytes)?.ok_or(damaged(Damage::CutOff))?;
-        ensure!(block::length(header, &bytes).map_err(damaged)? as u64 == entry.bytes, damaged(Damage::NoBlock));
+        let length = block::length(header, &bytes, |bytes| header.sum(bytes)).map_err(damaged)?;
+        ensure!(length as u64 == entry.bytes, damaged(Damage::NoBlock));
         let chosen = &self.playback.chosen;
         let block = block::decode(header, &bytes, |column| chosen.contains(&column)).map_err(damaged)?;
         // Another block of the recording that was put here is not what the index describes, or has been read before.
@@ -108,14 +109,16 @@ impl<R: Read + Seek> Blocks<'_, R> {
     }
 
     /// The next block of the stretch without index that is scanned; `None` at its end.
-    fn scanned(&mut self) -> Option<Result<Block, Error>> {
-        let (scanner, end) = self.scan.as_mut()?;
+    fn scanned(&mut self) -> Result<Option<Block>, Error> {
+        let Some((scanner, end)) = self.scan.as_mut() else {
+            return Ok(None);
+        };
         let Playback {
             reader, header, chosen, ..
         } = &mut *self.playback;
         let mut reader = reader.take(end.saturating_sub(scanner.read_to()));
         let next = scanner.next_block(&mut reader, header, |column| chosen.contains(&column));
-        if !matches!(next, Some(Ok(_) | Err(Error::Block { .. }))) {
+        if !matches!(next, Ok(Some(_)) | Err(Error::Block { .. })) {
             self.scan = None;
         }
         next
@@ -130,47 +133,36 @@ impl<R: Read + Seek> Blocks<'_, R> {
     }
 
     /// What comes next. A block that is [`Part::Known`] may be passed over.
-    pub(crate) fn part(&mut self) -> Option<Result<Part, Error>> {
+    pub(crate) fn part(&mut self) -> Result<Option<Part>, Error> {
         if std::mem::take(&mut self.single) {
             let block = self.playback.only(|column| self.playback.chosen.contains(&column))?;
-            return Some(block.map(Part::Found));
+            return Ok(block.map(Part::Found));
         }
         loop {
+            let end = self.playback.span.1;
             if self.scan.is_some() {
-                match self.scanned() {
-                    Some(block) => return Some(block.map(Part::Found)),
-                    None if self.playback.index == Index::Missing => {
-                        return Some(Err(Error::block(self.playback.span.1, 0, Damage::NoEnd)));
-                    }
-                    None => continue,
+                if let Some(block) = self.scanned()? {
+                    return Ok(Some(Part::Found(block)));
                 }
-            }
-            if let Some(entry) = self.entries.next() {
+                ensure!(self.playback.index != Index::Missing, Error::block(end, 0, Damage::NoEnd));
+            } else if let Some(entry) = self.entries.next() {
                 // An entry without rows stands for damaged bytes, whose times are unknown: they are reported for every range.
-                if entry.rows > 0 && !self.overlaps(entry.ticks) {
-                    continue;
+                if entry.rows == 0 || self.overlaps(entry.ticks) {
+                    return Ok(Some(Part::Known(entry)));
                 }
-                return Some(Ok(Part::Known(entry)));
-            }
-            let Index::Whole(segments) = &self.playback.index else {
-                if std::mem::replace(&mut self.scanned, true) {
-                    return None;
+            } else if let Index::Whole(segments) = &self.playback.index {
+                let Some(segment) = segments.get(self.next_segment).copied() else {
+                    return Ok(None);
+                };
+                self.next_segment += 1;
+                if segment.rows == 0 || self.overlaps(segment.ticks) {
+                    self.enter(&segment)?;
                 }
-                if let Err(error) = self.start_scan(self.playback.span, Order::default()) {
-                    return Some(Err(error));
-                }
-                if self.playback.index == Index::Other {
-                    return Some(Err(Error::block(self.playback.span.1, 0, Damage::Index)));
-                }
-                continue;
-            };
-            let segment = *segments.get(self.next_segment)?;
-            self.next_segment += 1;
-            if segment.rows > 0 && !self.overlaps(segment.ticks) {
-                continue;
-            }
-            if let Err(error) = self.enter(&segment) {
-                return Some(Err(error));
+            } else if std::mem::replace(&mut self.scanned, true) {
+                return Ok(None);
+            } else {
+                self.start_scan(self.playback.span, Order::default())?;
+                ensure!(self.playback.index != Index::Other, Error::block(end, 0, Damage::Index));
             }
         }
     }
@@ -188,7 +180,7 @@ impl<R: Read + Seek> Iterator for Blocks<'_, R> {
     type Item = Result<Block, Error>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let part = self.part()?;
+        let part = self.part().transpose()?;
         Some(part.and_then(|part| self.block(part)))
     }
 }

@@ -64,6 +64,11 @@ pub(crate) const TENS: [f64; 16] = [
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
 ];
 
+/// Half a unit of the last of these decimals.
+pub(crate) fn half_unit(places: u8) -> f64 {
+    0.5 / TENS.get(usize::from(places)).copied().unwrap_or(1.0)
+}
+
 /// The integer `j` with `j / 10^places == value`, if there is one below 2^53.
 pub(crate) fn decimal(value: f64, places: u8) -> Option<i64> {
     let ten = *TENS.get(usize::from(places))?;
@@ -85,13 +90,10 @@ impl Bound {
             Self::Relative { share, floor } => {
                 is_within(sample, restored, (share * sample.abs()).next_down().max(floor))
             }
-            Self::Decimals(places) => {
-                let half = 0.5 / TENS.get(usize::from(places)).copied().unwrap_or(1.0);
-                match decimal(sample, places) {
-                    Some(_) => sample == restored,
-                    None => is_within(sample, restored, half),
-                }
-            }
+            Self::Decimals(places) => match decimal(sample, places) {
+                Some(_) => sample == restored,
+                None => is_within(sample, restored, half_unit(places)),
+            },
         }
     }
 }

@@ -49,10 +49,8 @@ impl Column {
     /// # Errors
     /// If the name is longer than 1024 bytes.
     pub fn of_integers(name: impl Into<String>, origin: i64) -> Result<Self, Error> {
-        Ok(Self {
-            integers: Some(Integers::from_origin(origin)),
-            ..Self::new(name, Bound::Lossless)?
-        })
+        let integers = Some(Integers::from_origin(origin));
+        Self::new(name, Bound::Lossless).map(|column| Self { integers, ..column })
     }
 
     /// What the samples stand for, if they are codes of whole numbers ([`of_integers`](Self::of_integers)).
@@ -84,11 +82,9 @@ impl Column {
     ///
     /// # Errors
     /// If it is longer than 1024 bytes.
-    pub fn with_unit(self, unit: impl Into<String>) -> Result<Self, Error> {
-        Ok(Self {
-            unit: text("unit", unit.into())?,
-            ..self
-        })
+    pub fn with_unit(mut self, unit: impl Into<String>) -> Result<Self, Error> {
+        self.unit = text("unit", unit.into())?;
+        Ok(self)
     }
 
     /// Declares that samples are directions on a circle of this circumference (360 for degrees). The bound then holds around the circle,
@@ -97,15 +93,13 @@ impl Column {
     /// # Errors
     /// If `period` is not positive and finite, exceeds `2^40` times the bound, or the bound is [`Bound::Decimals`] or
     /// [`Bound::Relative`].
-    pub fn with_period(self, period: f64) -> Result<Self, Error> {
+    pub fn with_period(mut self, period: f64) -> Result<Self, Error> {
         ArgumentError::positive("period", period)?;
         let expected = "an absolute bound, a share of the range or lossless for a column on a circle";
         ensure!(self.is_summed(), "bound", format!("{:?}", self.bound), expected);
         check_circle(self.bound, period)?;
-        Ok(Self {
-            period: Some(period),
-            ..self
-        })
+        self.period = Some(period);
+        Ok(self)
     }
 
     /// Sets the range that a share refers to, if it is known beforehand. Without it, it is the range of the rows so far, or on a circle
@@ -113,16 +107,14 @@ impl Column {
     ///
     /// # Errors
     /// If an end is not finite or `from` is above `to`.
-    pub fn with_range(self, from: f64, to: f64) -> Result<Self, Error> {
+    pub fn with_range(mut self, from: f64, to: f64) -> Result<Self, Error> {
         ArgumentError::finite("from", from)?;
         ArgumentError::finite("to", to)?;
         let range = to - from;
         let expected = "a range of finite width, `from` below `to`";
         ensure!((0.0..f64::INFINITY).contains(&range), "range", format!("{from:?} to {to:?}"), expected);
-        Ok(Self {
-            range: Some(range),
-            ..self
-        })
+        self.range = Some(range);
+        Ok(self)
     }
 
     /// The name.

@@ -153,18 +153,17 @@ impl Error {
 
 /// A name for a message: at most 80 characters of it.
 fn shortened(name: &str) -> String {
-    match name.char_indices().nth(80) {
-        Some((end, _)) => format!("{}…", &name[..end]),
-        None => name.to_owned(),
-    }
+    let end = name.char_indices().nth(80);
+    end.map_or_else(|| name.to_owned(), |(end, _)| format!("{}…", &name[..end]))
 }
 
 /// Names with commas between them; of more than 20 the first ones, and the number of others.
 pub(crate) fn listed<'a>(mut names: impl Iterator<Item = &'a str>) -> String {
-    let mut text = names.by_ref().take(20).map(shortened).collect::<Vec<_>>().join(", ");
-    match names.count() {
-        0 => {}
-        more => text += &format!(" and {more} more"),
+    let text = names.by_ref().take(20).map(shortened).collect::<Vec<_>>().join(", ");
+    let more = names.count();
+    if more > 0 {
+        format!("{text} and {more} more")
+    } else {
+        text
     }
-    text
 }

@@ -5,9 +5,9 @@ use crate::codec::{Target, adaptive};
 use crate::column::check_circle;
 use crate::header_column::shortened;
 use crate::schema::{Schema, TimeBase};
-use crate::time::Grid;
+use crate::time::{self, Grid};
 pub(crate) use crate::wire::VERSION_5;
-use crate::wire::written;
+use crate::wire::{checksum, written};
 use fewbits_block_codec::Start;
 use std::collections::hash_map::RandomState;
 use std::hash::{BuildHasher, Hasher};
@@ -90,21 +90,16 @@ impl Header {
                 }
             }
         }
-        let grid = match schema.time {
-            TimeBase::Numbered => Grid {
-                origin: ticks.first().copied().unwrap_or(0),
-                step: 1,
-                rows_per_block: schema.rows_per_block,
-                tolerance: 0,
-            },
-            TimeBase::Clock { tolerance, .. } => Grid::of(ticks, schema.rows_per_block, tolerance),
+        let step = match schema.time {
+            TimeBase::Numbered => 1,
+            TimeBase::Clock { tolerance, .. } => time::step(ticks, tolerance),
         };
         let header = Self {
             identity: random(),
             starts: vec![None; schema.columns.len()],
             schema,
-            origin: grid.origin,
-            step: grid.step,
+            origin: ticks.first().copied().unwrap_or(0),
+            step,
             share_bounds: share_bounds.into_iter().map(rounded_down).collect(),
             ..BLANK
         };
@@ -143,13 +138,9 @@ impl Header {
     }
 
     /// The header of a recording of this version with the same columns.
-    pub(crate) fn renewed(self) -> Self {
-        Self {
-            version: VERSION,
-            identity: random(),
-            ..self
-        }
-        .checked()
+    pub(crate) fn renewed(mut self) -> Self {
+        self.version = VERSION;
+        self.with_identity(random())
     }
 
     /// Whether the index of a finished recording must follow.
@@ -167,6 +158,11 @@ impl Header {
         self
     }
 
+    /// The checksum of a record of this recording.
+    pub(crate) fn sum(&self, bytes: &[u8]) -> u32 {
+        checksum(&[&self.check.to_le_bytes(), bytes])
+    }
+
     /// The start of a column for a block. A block with a bound of its own has another grid and no start.
     pub(crate) fn start(&self, column: usize, own: Option<f64>) -> Option<Start> {
         self.starts[column].filter(|_| own.is_none())
@@ -181,21 +177,16 @@ impl Header {
             origin: self.origin,
             step: self.step,
             rows_per_block: self.schema.rows_per_block,
-            tolerance: if self.schema.keeps_ticks {
-                0
-            } else {
-                self.schema.time.tolerance()
+            tolerance: match self.schema.keeps_ticks {
+                true => 0,
+                false => self.schema.time.tolerance(),
             },
         }
     }
 
     /// The bound of a column in a block; `own` is the block's own one.
     pub(crate) fn target(&self, column: usize, own: Option<f64>) -> Target {
-        let spec = &self.schema.columns[column];
-        Target {
-            bound: spec.bound_in(own.unwrap_or(self.share_bounds[column])),
-            period: spec.period,
-        }
+        Target::of(&self.schema.columns[column], own.unwrap_or(self.share_bounds[column]))
     }
 }
 

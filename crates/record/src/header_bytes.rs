@@ -6,9 +6,8 @@ use crate::error::{Damage, Error, ensure};
 use crate::header::{BLANK, Form, Header, IDENTITY_BYTES, MAGIC, MAGIC_5, MAX_HEADER, VERSION, VERSION_5};
 use crate::header_column::{column, refused};
 use crate::schema::{MAX_COLUMNS, Schema, TIME_NAME, TimeBase, TimeFormat, default_rows};
-use crate::wire::{Bytes, CHECK_BYTES, Fields, checksum, push_varint, with_checksum, written};
+use crate::wire::{Bytes, CHECK_BYTES, Fields, checksum, flag, push_varint, with_checksum, written};
 use fewbits_block_codec::bytes::Unread;
-use std::ops::Range;
 
 impl Header {
     /// Reads a header from the front of `bytes`.
@@ -16,68 +15,52 @@ impl Header {
     /// # Errors
     /// If the bytes are no header.
     pub(crate) fn read(bytes: &[u8]) -> Result<Known, Error> {
+        match Self::whole(bytes) {
+            Err(Error::Header(Damage::CutOff)) => Ok(Known::More),
+            found => found,
+        }
+    }
+
+    fn whole(bytes: &[u8]) -> Result<Known, Error> {
         let known = bytes.len().min(MAGIC.len());
         ensure!(bytes[..known] == MAGIC[..known], Error::NotARecording);
         let mut reader = Bytes(&bytes[known..]);
-        let Ok(version) = reader.byte() else {
-            return Ok(Known::More);
-        };
-        let version = match version {
-            VERSION => VERSION,
+        let damaged = |unread: Unread| Error::Header(unread.into());
+        let layout = match reader.byte().map_err(damaged)? {
+            VERSION => Layout::Known,
             first if first == VERSION | SINGLE => return Ok(Known::Single),
-            first if first == MAGIC_5[0] => {
-                let Ok(rest) = reader.array::<3>() else {
-                    return Ok(Known::More);
-                };
-                match rest {
-                    [b'\r', b'\n', VERSION_5] => VERSION_5,
-                    [b'\r', b'\n', found] => return Err(unknown(found)),
-                    _ => return Err(Error::NotARecording),
-                }
-            }
+            first if first == MAGIC_5[0] => match reader.array().map_err(damaged)? {
+                [b'\r', b'\n', VERSION_5] => Layout::Version5,
+                [b'\r', b'\n', found] => return Err(unknown(found)),
+                _ => return Err(Error::NotARecording),
+            },
             found => return Err(unknown(found)),
         };
-        let length = match reader.count(MAX_HEADER, "length of the header") {
-            Ok(length) => length,
-            Err(Unread::CutOff) => return Ok(Known::More),
-            Err(unread) => return Err(Error::Header(unread.into())),
+        let length = reader.count(MAX_HEADER, "length of the header").map_err(damaged)?;
+        let (version, identity) = match layout {
+            Layout::Version5 => (VERSION_5, [0; IDENTITY_BYTES]),
+            _ => (VERSION, reader.array().map_err(damaged)?),
         };
-        let mut identity = [0; IDENTITY_BYTES];
-        if version == VERSION {
-            let Ok(found) = reader.array() else {
-                return Ok(Known::More);
-            };
-            identity = found;
-        }
-        let Ok(body) = reader.take(length) else {
-            return Ok(Known::More);
-        };
+        let mut body = Bytes(reader.take(length).map_err(damaged)?);
         let end = bytes.len() - reader.0.len();
-        let Ok(check) = reader.array::<CHECK_BYTES>().map(u32::from_le_bytes) else {
-            return Ok(Known::More);
-        };
+        let check = u32::from_le_bytes(reader.array().map_err(damaged)?);
         ensure!(check == checksum(&[&bytes[..end]]), Error::Header(Damage::Checksum));
-        let mut body = Bytes(body);
-        let (layout, identity) = match version {
-            VERSION_5 => (Layout::Version5, 0),
-            _ => (Layout::Known, u32::from_le_bytes(identity)),
-        };
         let header = BLANK.body(&mut body, layout);
         let header = header.and_then(|header| Ok(body.finish().map(|()| header)?));
         Ok(Known::Header(Box::new(Self {
             version,
-            identity,
+            identity: u32::from_le_bytes(identity),
             length: end + CHECK_BYTES,
             check,
             ..header.map_err(Error::Header)?
         })))
     }
 
-    /// Reads a whole recording of a single block: its header, and where the block's content stands.
+    /// Reads a whole recording of a single block: its header, and the block's content.
     ///
     /// # Errors
     /// If the bytes are not a whole recording of a single block.
-    pub(crate) fn read_single(bytes: &[u8]) -> Result<(Self, Range<usize>), Error> {
+    pub(crate) fn read_single(bytes: &[u8]) -> Result<(Self, &[u8]), Error> {
         let (content, check) = bytes
             .split_last_chunk::<CHECK_BYTES>()
             .ok_or(Error::Header(Damage::CutOff))?;
@@ -85,8 +68,7 @@ impl Header {
         // Magic bytes and version.
         let mut body = Bytes(content.get(MAGIC.len() + 1..).ok_or(Error::Header(Damage::CutOff))?);
         let header = BLANK.body(&mut body, Layout::Single).map_err(Error::Header)?;
-        let start = content.len() - body.0.len();
-        Ok((header, start..content.len()))
+        Ok((header, body.0))
     }
 
     /// The encoded header, of this version: magic bytes, version, length, identity, content, checksum. That of a single block has neither length nor
@@ -133,7 +115,6 @@ impl Header {
                 format,
             } => (1 + format as u8, decimals, tolerance),
         };
-        let flag = |given: bool, flag: u8| if given { flag } else { 0 };
         let flags = flag(self.form == Form::Stream, STREAM)
             | flag(self.origin != 0, ORIGIN)
             | flag(own.columns.len() > 1, COLUMNS)

@@ -5,7 +5,7 @@ use crate::codec::{Target, adaptive};
 use crate::column::Column;
 use crate::error::{Damage, Error};
 use crate::integers::Integers;
-use crate::wire::{Fields, short_bound};
+use crate::wire::{Fields, flag, short_bound};
 use fewbits_block_codec::Start;
 use std::f64::consts::TAU;
 
@@ -71,7 +71,6 @@ pub(crate) fn column<F: Fields>(
     start: Option<&Start>,
 ) -> Result<(Column, f64, Option<Start>), Damage> {
     let name = fields.text(&own.name)?;
-    let flag = |given: bool, flag: u8| if given { flag } else { 0 };
     let flags = flag(own.period.is_some(), HAS_PERIOD)
         | flag(start.is_some(), HAS_START)
         | flag(!own.unit.is_empty(), HAS_UNIT)
@@ -119,10 +118,7 @@ pub(crate) fn column<F: Fields>(
         let earlier = number(fields, own.earlier)?;
         column = column.with_earlier_bound(earlier).map_err(refused)?;
     }
-    let target = Target {
-        bound: column.bound_in(bound_of_share),
-        period: column.period,
-    };
+    let target = Target::of(&column, bound_of_share);
     let start = (kind & HAS_START != 0).then(|| adaptive::code_start(fields, start, &target));
     Ok((column, bound_of_share, start.transpose()?))
 }

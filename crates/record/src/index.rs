@@ -8,7 +8,7 @@ use crate::aggregate::{self, Aggregate};
 use crate::block::Cells;
 use crate::error::{Damage, ensure};
 use crate::header::{Header, VERSION_5};
-use crate::wire::{Bytes, Fields, checked, read_checked, unzigzag, zigzag};
+use crate::wire::{Bytes, Fields, checked, read, read_checked, unzigzag, zigzag};
 
 /// Least number of rows per block with which the index has aggregates: those of a column take 25 bytes per block, of smaller blocks a larger part.
 const AGGREGATED_ROWS: usize = 4096;
@@ -74,9 +74,7 @@ impl BlockInfo {
             aggregates: Some(aggregates),
         }
     }
-}
 
-impl BlockInfo {
     /// Whether these may be the ticks of the block that this entry describes.
     pub(crate) fn describes(&self, ticks: &[i64], header: &Header) -> bool {
         let tolerance = header.schema.time.tolerance();
@@ -150,23 +148,32 @@ pub(crate) fn max_content(kind: u8, header: &Header) -> usize {
     }
 }
 
-/// Kind, content and whole length of the special record at the front, which begins with 0.
-pub(crate) fn read_special<'a>(header: &Header, bytes: &'a [u8]) -> Result<(u8, &'a [u8], usize), Damage> {
+/// Kind, content and whole length of the special record at the front, which begins with 0. `sum` gives the checksum of the first bytes.
+pub(crate) fn read_special<'a>(
+    header: &Header,
+    bytes: &'a [u8],
+    sum: impl FnOnce(&[u8]) -> u32,
+) -> Result<(u8, &'a [u8], usize), Damage> {
     let [mark, kind] = Bytes(bytes).array()?;
     ensure!(mark == 0, Damage::NoBlock);
     let limit = max_content(kind, header);
-    let (content, whole) = read_checked(header.check, bytes, 2, 0..=limit)?;
+    let (content, whole) = read_checked(bytes, 2, 0..=limit, sum)?;
     Ok((kind, content, whole))
+}
+
+/// Entries and whole length of the segment of the index at the front, whose first block is at `offset`. `None` if it is none, or damaged.
+pub(crate) fn listed(header: &Header, bytes: &[u8], offset: u64) -> Option<(Vec<BlockInfo>, u64)> {
+    let special = read_special(header, bytes, |bytes| header.sum(bytes)).ok();
+    let (_, content, whole) = special.filter(|(kind, ..)| matches!(*kind, SEGMENT | ONLY))?;
+    let entries = read(content, |fields| segment(fields, header, offset, &[])).ok()?;
+    Some((entries, whole as u64))
 }
 
 /// The largest `f32` that does not exceed `value`.
 fn f32_below(value: f64) -> f32 {
     let near = value as f32;
-    if f64::from(near) > value {
-        near.next_down()
-    } else {
-        near
-    }
+    let is_larger = f64::from(near) > value;
+    if is_larger { near.next_down() } else { near }
 }
 
 /// The largest number of three bytes, the first ones of a big-endian `f32`, that does not exceed `value`.
@@ -174,11 +181,8 @@ fn short_below(value: f64) -> f32 {
     let near = f32_below(value).to_bits();
     // Dropping the last byte makes a negative number larger.
     let cut = near & !0xff;
-    f32::from_bits(if near >> 31 == 1 && cut != near {
-        cut + 0x100
-    } else {
-        cut
-    })
+    let is_larger = near >> 31 == 1 && cut != near;
+    f32::from_bits(if is_larger { cut + 0x100 } else { cut })
 }
 
 fn short_above(value: f64) -> f32 {
@@ -202,20 +206,12 @@ fn level_below(value: f64, ends: (f64, f64)) -> u8 {
     let share = (value - ends.0) / (ends.1 - ends.0);
     let level = (LEVELS * share).floor().clamp(0.0, LEVELS) as u8;
     // Rounding may put the level above the value.
-    if level > 0 && level_value(level, ends) > value {
-        level - 1
-    } else {
-        level
-    }
+    level - u8::from(level > 0 && level_value(level, ends) > value)
 }
 
 fn level_above(value: f64, ends: (f64, f64)) -> u8 {
     let level = level_below(value, ends);
-    if level_value(level, ends) < value {
-        (level + 1).min(MOST)
-    } else {
-        level
-    }
+    (level + u8::from(level_value(level, ends) < value)).min(MOST)
 }
 
 fn level_value(level: u8, ends: (f64, f64)) -> f64 {
@@ -326,7 +322,7 @@ pub(crate) fn trailer(footer: u64) -> Vec<u8> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::wire::{read, written};
+    use crate::wire::written;
     use crate::{Bound, Column, Schema, TimeBase};
 
     #[test]

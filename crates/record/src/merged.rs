@@ -2,7 +2,7 @@
 
 use crate::blocks::Rows;
 use crate::column::Column;
-use crate::error::Error;
+use crate::error::{Error, ensure};
 use crate::integers::Integers;
 use crate::playback::{Playback, Row};
 use crate::schema::{Schema, TimeBase, TimeFormat};
@@ -31,22 +31,23 @@ fn names(schema: &Schema) -> Vec<&str> {
     schema.columns.iter().map(Column::name).collect()
 }
 
-/// The format of times and their decimals; `None` if rows are numbered.
-fn clock(time: TimeBase) -> Option<(TimeFormat, u8)> {
+fn described(time: TimeBase) -> &'static str {
     match time {
-        TimeBase::Clock { decimals, format, .. } => Some((format, decimals)),
-        TimeBase::Numbered => None,
+        TimeBase::Numbered => "numbers of rows",
+        TimeBase::Clock { format, .. } => match format {
+            TimeFormat::Seconds => "seconds",
+            TimeFormat::Utc => "UTC",
+            TimeFormat::Local => "times without a zone",
+        },
     }
 }
 
-fn described(time: TimeBase) -> String {
-    let what = match clock(time) {
-        None => "numbers of rows",
-        Some((TimeFormat::Seconds, _)) => "seconds",
-        Some((TimeFormat::Utc, _)) => "UTC",
-        Some((TimeFormat::Local, _)) => "times without a zone",
-    };
-    what.to_owned()
+/// Decimals of a second; 0 if rows are numbered.
+fn decimals(schema: &Schema) -> u8 {
+    match schema.time {
+        TimeBase::Clock { decimals, .. } => decimals,
+        TimeBase::Numbered => 0,
+    }
 }
 
 /// Which of the wanted columns have other codes of whole numbers than those of the first recording.
@@ -66,14 +67,22 @@ fn codes(schema: &Schema, first: Option<&Schema>, wanted: &[&str]) -> Result<Vec
     Ok(found)
 }
 
-/// A row with the codes of the first recording.
-fn recoded(mut row: Row, codes: &[(usize, Integers, Integers)]) -> Row {
-    for (place, own, wanted) in codes {
-        if let Some(Some(code)) = row.values.get_mut(*place) {
-            *code = wanted.code(own.number(*code));
+impl<R: Read + Seek> Source<'_, R> {
+    /// The next row, with the finest ticks and the codes of the first recording.
+    fn read(&mut self) -> Result<Option<Row>, Error> {
+        let Some(mut row) = self.rows.next().transpose()? else {
+            return Ok(None);
+        };
+        let expected = "a tick that fits 64 bits with the decimals of the finest recording";
+        let finer = row.tick.checked_mul(self.factor);
+        row.tick = finer.ok_or_else(|| ArgumentError::new("time", row.tick, expected))?;
+        for (place, own, wanted) in &self.codes {
+            if let Some(Some(code)) = row.values.get_mut(*place) {
+                *code = wanted.code(own.number(*code));
+            }
         }
+        Ok(Some(row))
     }
-    row
 }
 
 /// The rows with ticks in `from..=to` of several recordings as one table: at each step the earliest next row, of equal ticks that of the
@@ -95,26 +104,23 @@ pub fn merged<'a, R: Read + Seek>(
         for (i, playback) in playbacks.iter().enumerate() {
             let mut others = names(playback.schema());
             others.sort_unstable();
-            if others != sorted {
-                let found = format!("{} in recording {}", others.join(", "), i + 1);
-                return Err(
-                    ArgumentError::new("columns", found, format!("those of the first: {}", sorted.join(", "))).into()
-                );
-            }
-            if clock(playback.schema().time).map(|own| own.0) != clock(first.time).map(|own| own.0) {
-                let found = format!("{} in recording {}", described(playback.schema().time), i + 1);
-                let expected = format!("{}, as in the first", described(first.time));
-                return Err(ArgumentError::new("time", found, expected).into());
-            }
+            let found = |what: String| format!("{what} in recording {}", i + 1);
+            let expected = || format!("those of the first: {}", sorted.join(", "));
+            ensure!(others == sorted, "columns", found(others.join(", ")), expected());
+            let [own, wanted] = [playback.schema(), first].map(|schema| described(schema.time));
+            ensure!(own == wanted, "time", found(own.to_owned()), format!("{wanted}, as in the first"));
         }
     }
-    let decimals = |playback: &Playback<R>| clock(playback.schema().time).map_or(0, |own| own.1);
-    let finest = playbacks.iter().map(decimals).max().unwrap_or(0);
+    let finest = playbacks
+        .iter()
+        .map(|playback| decimals(playback.schema()))
+        .max()
+        .unwrap_or(0);
     let mut sources = BTreeMap::new();
     for (i, playback) in playbacks.iter_mut().enumerate() {
         playback.columns(wanted)?;
         // Without an index the first tick is not known: such a recording is open from the beginning.
-        let factor = 10_i64.pow(u32::from(finest - decimals(playback)));
+        let factor = 10_i64.pow(u32::from(finest - decimals(playback.schema())));
         let begin = playback
             .ticks()?
             .map_or(i64::MIN, |ticks| ticks.0.saturating_mul(factor).max(from));
@@ -137,24 +143,18 @@ impl<R: Read + Seek> Iterator for Merged<'_, R> {
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
-            let ((tick, place), mut source) = self.sources.pop_first()?;
-            let (tick, item) = match source.next.take() {
-                Some(row) => (tick, Some(Ok(row))),
-                None => match source.rows.next() {
-                    Some(Ok(mut row)) => match row.tick.checked_mul(source.factor) {
-                        Some(finer) => {
-                            row.tick = finer;
-                            source.next = Some(recoded(row, &source.codes));
-                            (finer, None)
-                        }
-                        None => {
-                            let expected = "a tick that fits 64 bits with the decimals of the finest recording";
-                            (tick, Some(Err(ArgumentError::new("time", row.tick, expected).into())))
-                        }
-                    },
-                    Some(Err(error)) => (tick, Some(Err(error))),
+            let ((mut tick, place), mut source) = self.sources.pop_first()?;
+            let item = match source.next.take() {
+                Some(row) => Some(Ok(row)),
+                None => match source.read() {
+                    Ok(Some(row)) => {
+                        tick = row.tick;
+                        source.next = Some(row);
+                        None
+                    }
                     // The recording is closed.
-                    None => continue,
+                    Ok(None) => continue,
+                    Err(error) => Some(Err(error)),
                 },
             };
             self.sources.insert((tick, place), source);

@@ -121,8 +121,8 @@ impl<R: Read + Seek> Playback<R> {
     /// # Errors
     /// If the only block is damaged.
     pub fn ticks(&self) -> Result<Option<(i64, i64)>, Error> {
-        if let Some(block) = self.only(|_| false) {
-            return Ok(index::ends_of(&block?.ticks));
+        if let Some(block) = self.only(|_| false)? {
+            return Ok(index::ends_of(&block.ticks));
         }
         let Index::Whole(segments) = &self.index else {
             return Ok(None);
@@ -132,9 +132,9 @@ impl<R: Read + Seek> Playback<R> {
     }
 
     /// The only block, if there is one.
-    pub(crate) fn only(&self, wanted: impl Fn(usize) -> bool) -> Option<Result<Block, Error>> {
-        let content = self.single.as_deref()?;
-        Some(block::only(&self.header, content, self.span.1, wanted))
+    pub(crate) fn only(&self, wanted: impl Fn(usize) -> bool) -> Result<Option<Block>, Error> {
+        let only = |content: &Vec<u8>| block::only(&self.header, content, self.span.1, wanted);
+        self.single.as_ref().map(only).transpose()
     }
 
     /// Length of the whole recording in bytes.
@@ -147,10 +147,8 @@ impl<R: Read + Seek> Playback<R> {
     /// # Errors
     /// If there is no such column. The request before then stays in effect.
     pub fn columns(&mut self, names: &[&str]) -> Result<&mut Self, Error> {
-        self.chosen = names
-            .iter()
-            .map(|name| self.header.schema.position(name))
-            .collect::<Result<_, _>>()?;
+        let places = names.iter().map(|name| self.header.schema.position(name));
+        self.chosen = places.collect::<Result<_, _>>()?;
         Ok(self)
     }
 
@@ -160,8 +158,8 @@ impl<R: Read + Seek> Playback<R> {
     /// If reading fails or a part of the index is damaged.
     pub fn index(&mut self) -> Result<Vec<BlockInfo>, Error> {
         let mut infos = Vec::new();
-        if let Some(block) = self.only(|_| true) {
-            let (block, length) = (block?, self.single.as_ref().map_or(0, Vec::len) as u64);
+        if let Some(block) = self.only(|_| true)? {
+            let length = self.single.as_ref().map_or(0, Vec::len) as u64;
             // The checksum of the whole recording follows the content.
             let offset = self.span.1.saturating_sub(length + 4);
             infos.push(BlockInfo::of(offset, length, &block.ticks, &block.columns));
@@ -189,43 +187,37 @@ pub(crate) fn read_at(reader: &mut (impl Read + Seek), offset: u64, length: u64)
     }
 }
 
-/// The index of a recording of several blocks.
+/// The index of a recording of several blocks, in front of its last bytes.
 pub(crate) fn index_of(reader: &mut (impl Read + Seek), header: &Header) -> Result<Index, Error> {
-    Ok(found(reader, header)?.unwrap_or(if header.has_end() {
+    let none = if header.has_end() {
         Index::Missing
     } else {
         Index::NotNeeded
-    }))
-}
-
-/// The index in front of the last bytes; `None` if there is none.
-fn found(reader: &mut (impl Read + Seek), header: &Header) -> Result<Option<Index>, Error> {
+    };
     let end = reader.seek(SeekFrom::End(0)).map_err(Error::io("read"))?;
-    let Some(trailer) = end.checked_sub(TRAILER_BYTES as u64) else {
-        return Ok(None);
-    };
+    let trailer = end.saturating_sub(TRAILER_BYTES as u64);
     let bytes = read_at(reader, trailer, TRAILER_BYTES as u64)?.unwrap_or_default();
-    let length = bytes
-        .first_chunk()
-        .map_or(0, |length| u64::from(u32::from_le_bytes(*length)));
-    let Some(start) = trailer.checked_sub(length).filter(|_| bytes.ends_with(&END)) else {
-        return Ok(None);
+    let length = match bytes.split_first_chunk() {
+        Some((length, end)) if *end == END => u64::from(u32::from_le_bytes(*length)),
+        _ => return Ok(none),
     };
+    // No index begins at the beginning of a recording.
+    let start = trailer.saturating_sub(length);
     let bytes = read_at(reader, start, length)?.unwrap_or_default();
     let first = header.length as u64;
-    let (found, expected) = match index::read_special(header, &bytes) {
+    let (found, expected) = match index::read_special(header, &bytes, |bytes| header.sum(bytes)) {
         Ok((index::FOOTER, content, whole)) if whole as u64 == length => {
-            (read(content, |fields| index::footer(fields, header, &[])), start)
+            (read(content, |fields| index::footer(fields, header, &[])).ok(), start)
         }
-        Ok((index::ONLY, content, whole)) if whole as u64 == length => {
-            let entries = read(content, |fields| index::segment(fields, header, first, &[]));
-            (entries.map(|entries| vec![Segment::new(length, &entries)]), trailer)
+        Ok((index::ONLY, _, whole)) if whole as u64 == length => {
+            let listed = index::listed(header, &bytes, first);
+            (listed.map(|(entries, length)| vec![Segment::new(length, &entries)]), trailer)
         }
-        _ => return Ok(None),
+        _ => return Ok(none),
     };
     // The segments must fill the file up to the footer: offsets of blocks are sums of lengths.
     let ends = |segments: &Vec<Segment>| segments.last().map_or(first, Segment::end) == expected;
-    Ok(Some(found.ok().filter(ends).map_or(Index::Other, Index::Whole)))
+    Ok(found.filter(ends).map_or(Index::Other, Index::Whole))
 }
 
 /// The entries of a segment; `None` if it is damaged.
@@ -238,15 +230,10 @@ pub(crate) fn entries(
     let Some(bytes) = read_at(reader, offset, segment.length)? else {
         return Ok(None);
     };
-    let found = match index::read_special(header, &bytes) {
-        Ok((index::SEGMENT | index::ONLY, content, _)) => {
-            read(content, |fields| index::segment(fields, header, segment.start, &[])).ok()
-        }
-        _ => None,
-    };
-    let total = |entries: &Vec<BlockInfo>| {
+    let total = |(entries, _): &(Vec<BlockInfo>, u64)| {
         let mut lengths = entries.iter().map(|entry| entry.bytes);
-        lengths.try_fold(0_u64, |sum, length| sum.checked_add(length))
+        lengths.try_fold(0_u64, |sum, length| sum.checked_add(length)) == Some(segment.blocks)
     };
-    Ok(found.filter(|entries| total(entries) == Some(segment.blocks)))
+    let found = index::listed(header, &bytes, segment.start).filter(total);
+    Ok(found.map(|(entries, _)| entries))
 }

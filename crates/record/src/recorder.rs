@@ -141,7 +141,7 @@ impl<W: Write> Recorder<W> {
             entries: Vec::new(),
             segments: Vec::new(),
             next_number: 0,
-            append: Append::none(),
+            append: Append::default(),
             effort: Effort::default(),
             identity: None,
             broken: false,
@@ -158,11 +158,9 @@ impl<W: Write> Recorder<W> {
     /// is random. Blocks of recordings with one identity and equal headers can be exchanged unnoticed: derive it from what is recorded. No
     /// effect on a recording that is resumed.
     #[must_use]
-    pub fn with_identity(self, identity: u32) -> Self {
-        Self {
-            identity: Some(identity),
-            ..self
-        }
+    pub fn with_identity(mut self, identity: u32) -> Self {
+        self.identity = Some(identity);
+        self
     }
 
     /// Columns and time of the recording.
@@ -297,10 +295,7 @@ impl<W: Write> Recorder<W> {
         // Columns with starts share one code. It is shorter if they have few rows or help each other.
         let is_worth_it = columns.len() > 1 && rows <= SHARED_ROWS && self.effort == Effort::Thorough;
         let shared = is_worth_it.then(|| written(&plain.with_starts(columns)));
-        match shared {
-            Some(shared) if shared.len() < apart.len() => shared,
-            _ => apart,
-        }
+        shared.filter(|shared| shared.len() < apart.len()).unwrap_or(apart)
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), Error> {
@@ -368,11 +363,8 @@ impl<W: Write> Recorder<W> {
         }
         let header = self.header.as_ref().ok_or(Error::Broken)?;
         // Damage of which a resumed recording keeps the bytes may put more blocks between segments: a segment that lists none has them searched.
-        let listed = if self.entries.len() > BLOCKS_PER_SEGMENT {
-            &[]
-        } else {
-            self.entries.as_slice()
-        };
+        let is_listed = self.entries.len() <= BLOCKS_PER_SEGMENT;
+        let listed = if is_listed { self.entries.as_slice() } else { &[] };
         let content = written(|fields| index::segment(fields, header, 0, listed));
         let bytes = index::special(header.check, kind, &content);
         self.write(&bytes)?;

@@ -45,9 +45,6 @@ fn correlation(a: &[Option<f64>], b: &[Option<f64>]) -> f64 {
         }
     }
     let correlation = products / (squares_a.sqrt() * squares_b.sqrt());
-    if count >= MIN_STEPS && correlation.is_finite() {
-        correlation
-    } else {
-        0.0
-    }
+    let is_known = count >= MIN_STEPS && correlation.is_finite();
+    if is_known { correlation } else { 0.0 }
 }

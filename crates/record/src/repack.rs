@@ -3,14 +3,14 @@
 //! The rows of the new recording are the restored ones of the old, so their distance from the original samples is at most the sum of both
 //! bounds. The new header states both ([`Column::earlier_bound`]).
 
-use crate::bound::{Bound, TENS};
+use crate::bound::{Bound, half_unit};
 use crate::column::Column;
 use crate::error::Error;
 use crate::playback::Playback;
 use crate::ranges::{self, Ends};
 use crate::recorder::Recorder;
 use crate::schema::Schema;
-use fewbits_block_codec::{ArgumentError, Effort, ensure};
+use fewbits_block_codec::{Effort, ensure};
 use std::io::{Read, Seek, Write};
 
 /// What a pass over a recording finds for a column.
@@ -19,11 +19,6 @@ struct Found {
     ends: Ends,
     /// The largest bound of a share.
     share_bound: f64,
-}
-
-/// Half a unit of the last decimal.
-fn half_unit(places: u8) -> f64 {
-    0.5 / TENS.get(usize::from(places)).copied().unwrap_or(1.0)
 }
 
 /// The distance that a bound allows, in units of the column. `None` if it depends on the value.
@@ -70,10 +65,9 @@ fn widened(column: &Column, asked: Option<Bound>, found: Found) -> Result<(Colum
     };
     let Some(own) = own else {
         // Nothing can be added to a bound that depends on the value.
-        if asked.is_some_and(|bound| bound != Bound::Lossless && bound != column.bound) {
-            let expected = "no bound for a column whose bound is relative to each value";
-            return Err(ArgumentError::new("bound", format!("{asked:?} of `{}`", column.name), expected).into());
-        }
+        let is_kept = asked.is_none_or(|bound| bound == Bound::Lossless || bound == column.bound);
+        let expected = "no bound for a column whose bound is relative to each value";
+        ensure!(is_kept, "bound", format!("{asked:?} of `{}`", column.name), expected);
         return Ok((column.clone(), false));
     };
     // Both terms may be rounded down.

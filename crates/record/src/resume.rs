@@ -1,13 +1,12 @@
 //! Finding the place where an existing recording is continued.
 
-use crate::append::{self, Append};
+use crate::append::{self, Append, State};
 use crate::block;
 use crate::error::{Damage, Error, ensure};
 use crate::header::{Header, VERSION_5};
 use crate::index::{self, BLOCKS_PER_SEGMENT, BlockInfo, Segment};
 use crate::playback::{self, Index};
 use crate::scan::{Kind, Scanner};
-use crate::wire::read;
 use std::fs::File;
 use std::io::{Seek, SeekFrom};
 use std::path::Path;
@@ -51,10 +50,10 @@ pub(crate) fn open(path: &Path) -> Result<Opened, Error> {
             index = playback::index_of(&mut file, &header)?;
         }
     }
-    let resumed = match index {
-        Index::Whole(segments) => from_index(&mut file, &header, segments)?,
-        _ => None,
-    };
+    let mut resumed = None;
+    if let Index::Whole(segments) = index {
+        resumed = from_index(&mut file, &header, segments)?;
+    }
     let resumed = match resumed {
         Some(resumed) => resumed,
         None => from_blocks(&mut file, header)?,
@@ -63,7 +62,7 @@ pub(crate) fn open(path: &Path) -> Result<Opened, Error> {
     ensure!(are_numbers_left, Error::Header(Damage::Content("number of a block")));
     file.seek(SeekFrom::Start(resumed.offset)).map_err(Error::io("read"))?;
     let handle = file.try_clone().map_err(Error::io("open"))?;
-    let append = Append::planned(handle, path, resumed.offset);
+    let append = Append::new(handle, path, State::Planned(resumed.offset));
     Ok(Opened::InPlace(file, append, Box::new(resumed)))
 }
 
@@ -90,7 +89,7 @@ pub(crate) fn copy(locked: File, path: &Path) -> Result<(File, Append), Error> {
     options.read(true).write(true).create(true).truncate(true);
     let file = options.open(append::beside(path)).map_err(Error::io("copy"))?;
     append::lock(&file)?;
-    let append = Append::copy(file.try_clone().map_err(Error::io("copy"))?, locked, path);
+    let append = Append::new(file.try_clone().map_err(Error::io("copy"))?, path, State::Copy(locked));
     Ok((file, append))
 }
 
@@ -139,7 +138,8 @@ fn last_number(file: &mut File, header: &Header, entries: &[BlockInfo]) -> Resul
     let Some(bytes) = playback::read_at(file, last.offset, last.bytes)? else {
         return Ok(None);
     };
-    let block = block::length(header, &bytes).and_then(|_| block::decode(header, &bytes, |_| false));
+    let block =
+        block::length(header, &bytes, |bytes| header.sum(bytes)).and_then(|_| block::decode(header, &bytes, |_| false));
     // If another block was put there, the last number is not known.
     let block = block.ok().filter(|block| last.describes(&block.ticks, header));
     Ok(block.map(|block| block.number.unwrap_or(0)))
@@ -197,9 +197,7 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
 
 /// The segment of these bytes, if it describes as many bytes as these entries. Blocks that were damaged later are refused when they are read.
 fn listed(header: &Header, bytes: &[u8], entries: &[BlockInfo]) -> Option<Segment> {
-    let (_, content, whole) = index::read_special(header, bytes).ok()?;
-    let start = entries.first()?.offset;
-    let own = read(content, |fields| index::segment(fields, header, start, &[])).ok()?;
-    let segment = Segment::new(whole as u64, &own);
+    let (own, whole) = index::listed(header, bytes, entries.first()?.offset)?;
+    let segment = Segment::new(whole, &own);
     (segment.blocks == Segment::new(0, entries).blocks).then_some(segment)
 }

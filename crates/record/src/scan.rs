@@ -1,15 +1,14 @@
 //! Sequential reading of blocks without an index: files that were not finished, pipes, collected frames.
 
 use crate::block::{self, Block};
-use crate::error::{Damage, Error};
+use crate::error::{Damage, Error, ensure};
 use crate::header::{Header, MAX_HEADER};
 use crate::header_bytes::Known;
 use crate::index::{self, TRAILER_BYTES};
 use crate::rolling::Prefixes;
 use crate::schema::{MAX_CELLS, Schema};
-use crate::wire::{Bytes, CHECK_BYTES, checksum};
+use crate::wire::checksum;
 use std::io::Read;
-use std::ops::Range;
 
 /// Number of bytes requested at once.
 const CHUNK: usize = 1 << 16;
@@ -107,8 +106,7 @@ impl Scanner {
                 Known::Single if self.ended => {
                     let (header, content) = Header::read_single(&self.buffer)?;
                     self.position = self.buffer.len();
-                    let content: Range<usize> = content;
-                    return Ok((header, Some(self.buffer[content].to_vec())));
+                    return Ok((header, Some(content.to_vec())));
                 }
                 Known::Single if self.buffer.len() > MAX_SINGLE => return Err(Error::Header(Damage::NoBlock)),
                 Known::Single => {}
@@ -140,12 +138,18 @@ impl Scanner {
         &self.buffer[self.current..self.current + found.length]
     }
 
+    /// Kind and length of the record that begins here. Where the prefixes are known, in time that does not depend on its length.
     fn record_at(&self, header: &Header, at: usize) -> Result<(Kind, usize), Damage> {
         let bytes = &self.buffer[at..];
+        let sum = |bytes: &[u8]| {
+            let before = checksum(&[&header.check.to_le_bytes()]);
+            let known = self.prefixes.checksum(before, at, at + bytes.len());
+            known.unwrap_or_else(|| header.sum(bytes))
+        };
         match bytes.first() {
             None => Err(Damage::CutOff),
             Some(0) => {
-                let (kind, _, length) = index::read_special(header, bytes)?;
+                let (kind, _, length) = index::read_special(header, bytes, sum)?;
                 match kind {
                     index::SEGMENT => Ok((Kind::Segment, length)),
                     index::FOOTER | index::ONLY if bytes.len() < length + TRAILER_BYTES => Err(Damage::CutOff),
@@ -153,30 +157,7 @@ impl Scanner {
                     _ => Err(Damage::NoBlock),
                 }
             }
-            Some(_) => block::length(header, bytes).map(|length| (Kind::Block, length)),
-        }
-    }
-
-    /// Whether a record with a right checksum may begin here: as [`record_at`](Self::record_at), in time that does not depend on the length.
-    fn may_begin(&self, header: &Header, at: usize) -> Result<(), Damage> {
-        let bytes = &self.buffer[at..];
-        let mut reader = Bytes(bytes);
-        let limit = if bytes.first() == Some(&0) {
-            let [_, kind] = reader.array()?;
-            index::max_content(kind, header)
-        } else {
-            block::max_bytes(header)
-        };
-        let length = usize::try_from(reader.varint()?).ok().filter(|length| *length <= limit);
-        let length = length.ok_or(Damage::NoBlock)?;
-        let end = bytes.len() - reader.0.len() + length;
-        let stored = bytes.get(end..end + CHECK_BYTES).ok_or(Damage::CutOff)?;
-        let before = checksum(&[&header.check.to_le_bytes()]);
-        let sum = self.prefixes.checksum(before, at, at + end).ok_or(Damage::CutOff)?;
-        if stored == sum.to_le_bytes() {
-            Ok(())
-        } else {
-            Err(Damage::Checksum)
+            Some(_) => block::length(header, bytes, sum).map(|length| (Kind::Block, length)),
         }
     }
 
@@ -202,14 +183,10 @@ impl Scanner {
         let start = self.consumed();
         self.prefixes.clear();
         loop {
-            let searched = match first {
-                Some(_) => {
-                    self.prefixes.extend(&self.buffer);
-                    self.may_begin(header, self.position)
-                }
-                None => Ok(()),
-            };
-            match searched.and_then(|()| self.record_at(header, self.position)) {
+            if first.is_some() {
+                self.prefixes.extend(&self.buffer);
+            }
+            match self.record_at(header, self.position) {
                 Ok((kind, length)) => {
                     let found = self.found(kind, length);
                     let Some(damage) = first else { return Ok(Some(found)) };
@@ -237,29 +214,25 @@ impl Scanner {
         reader: &mut impl Read,
         header: &Header,
         wanted: impl Fn(usize) -> bool,
-    ) -> Option<Result<Block, Error>> {
+    ) -> Result<Option<Block>, Error> {
         loop {
-            let found = match self.next(reader, header) {
-                Ok(found) => found?,
-                Err(error) => return Some(Err(error)),
+            let Some(found) = self.next(reader, header)? else {
+                return Ok(None);
             };
             self.has_end = found.kind == Kind::Footer;
             if found.kind != Kind::Block {
                 continue;
             }
-            let block = match self.decoded(header, &found, &wanted) {
-                Ok(block) => block,
-                Err(error) => return Some(Err(error)),
+            let block = self.decoded(header, &found, &wanted)?;
+            return match self.order.judge(block.number) {
+                Ok(()) => Ok(Some(block)),
+                Err(Damage::Missing) => {
+                    // This is reported first, and the block by the next call.
+                    self.pending = Some(found);
+                    Err(Error::block(found.offset, 0, Damage::Missing))
+                }
+                Err(damage) => Err(found.damaged(damage)),
             };
-            let Some(damage) = self.order.judge(block.number) else {
-                return Some(Ok(block));
-            };
-            if damage == Damage::Missing {
-                // This is reported first, and the block by the next call.
-                self.pending = Some(found);
-                return Some(Err(Error::block(found.offset, 0, damage)));
-            }
-            return Some(Err(found.damaged(damage)));
         }
     }
 
@@ -293,18 +266,13 @@ impl Order {
     }
 
     /// Judges the next block: [`Damage::Missing`] once if others should stand before it, [`Damage::Misplaced`] if it must not be read.
-    pub(crate) fn judge(&mut self, number: Option<u64>) -> Option<Damage> {
-        let number = number?;
+    pub(crate) fn judge(&mut self, number: Option<u64>) -> Result<(), Damage> {
+        let Some(number) = number else { return Ok(()) };
         let expected = self.0.unwrap_or(number);
-        if number < expected {
-            return Some(Damage::Misplaced);
-        }
-        if number > expected {
-            self.0 = Some(number);
-            return Some(Damage::Missing);
-        }
-        self.0 = Some(number.saturating_add(1));
-        None
+        ensure!(number >= expected, Damage::Misplaced);
+        self.0 = Some(number.saturating_add(u64::from(number == expected)));
+        ensure!(number == expected, Damage::Missing);
+        Ok(())
     }
 }
 
@@ -339,10 +307,17 @@ impl<R: Read> BlockReader<R> {
         &self.header.schema
     }
 
-    /// The end, or an error once if there should be one and is none.
-    fn end(&mut self) -> Option<Result<Block, Error>> {
-        let is_told = self.scanner.has_end || !self.header.has_end() || std::mem::replace(&mut self.told_end, true);
-        (!is_told).then(|| Err(Error::block(self.scanner.consumed(), 0, Damage::NoEnd)))
+    /// The next block; at the end an error once if there should be one and is none.
+    fn block(&mut self) -> Result<Option<Block>, Error> {
+        if let Some(content) = self.single.take() {
+            return block::only(&self.header, &content, self.scanner.consumed(), |_| true).map(Some);
+        }
+        let found = self.scanner.next_block(&mut self.reader, &self.header, |_| true)?;
+        if found.is_none() && !self.scanner.has_end && self.header.has_end() {
+            let is_told = std::mem::replace(&mut self.told_end, true);
+            ensure!(is_told, Error::block(self.scanner.consumed(), 0, Damage::NoEnd));
+        }
+        Ok(found)
     }
 }
 
@@ -352,10 +327,6 @@ impl<R: Read> Iterator for BlockReader<R> {
     type Item = Result<Block, Error>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if let Some(content) = self.single.take() {
-            return Some(block::only(&self.header, &content, self.scanner.consumed(), |_| true));
-        }
-        let next = self.scanner.next_block(&mut self.reader, &self.header, |_| true);
-        next.or_else(|| self.end())
+        self.block().transpose()
     }
 }

@@ -2,7 +2,6 @@
 
 use crate::column::{Column, text};
 use crate::error::{Error, ensure, listed};
-use fewbits_block_codec::ArgumentError;
 
 /// Largest number of cells (rows times columns, time included) of one block, which a reader must hold in memory.
 pub const MAX_CELLS: usize = 1 << 24;
@@ -88,10 +87,8 @@ impl Schema {
         ensure!((1..=MAX_COLUMNS).contains(&columns.len()), "columns", columns.len(), "1 to 4096 columns");
         let mut names: Vec<&str> = columns.iter().map(Column::name).collect();
         names.sort_unstable();
-        if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(
-                ArgumentError::new("columns", format!("`{}` twice", pair[0]), "a name of its own for each").into()
-            );
+        for pair in names.windows(2) {
+            ensure!(pair[0] != pair[1], "columns", format!("`{}` twice", pair[0]), "a name of its own for each");
         }
         if let TimeBase::Clock {
             decimals, tolerance, ..
@@ -134,11 +131,9 @@ impl Schema {
     /// Declares that ticks were restored from a recording with this tolerance: a recorder returns them exactly, so that the stated
     /// tolerance still holds for the original ones.
     #[must_use]
-    pub fn with_restored_ticks(self) -> Self {
-        Self {
-            keeps_ticks: true,
-            ..self
-        }
+    pub fn with_restored_ticks(mut self) -> Self {
+        self.keeps_ticks = true;
+        self
     }
 
     /// Sets the number of rows per block; [`ROWS_PER_BLOCK`] stands for the default of this many columns. With small blocks fewer rows are lost with a block, and rows wait less on a link. Each block
@@ -147,24 +142,18 @@ impl Schema {
     /// # Errors
     /// If `rows` is 0 or a block would have more than [`MAX_CELLS`] cells.
     pub fn with_rows_per_block(self, rows: usize) -> Result<Self, Error> {
-        match rows {
-            // The default holds for any number of columns.
-            ROWS_PER_BLOCK => {
-                let rows = default_rows(self.columns.len());
-                self.with_exact_rows(rows)
-            }
-            rows => self.with_exact_rows(rows),
-        }
+        // The default holds for any number of columns.
+        let is_default = rows == ROWS_PER_BLOCK;
+        let default = default_rows(self.columns.len());
+        self.with_exact_rows(if is_default { default } else { rows })
     }
 
     /// As [`with_rows_per_block`](Self::with_rows_per_block), for what a header states.
-    pub(crate) fn with_exact_rows(self, rows: usize) -> Result<Self, Error> {
+    pub(crate) fn with_exact_rows(mut self, rows: usize) -> Result<Self, Error> {
         let limit = MAX_CELLS / (self.columns.len() + 1);
         ensure!((1..=limit).contains(&rows), "rows_per_block", rows, format!("1 to {limit} rows"));
-        Ok(Self {
-            rows_per_block: rows,
-            ..self
-        })
+        self.rows_per_block = rows;
+        Ok(self)
     }
 
     /// The columns, in their order.

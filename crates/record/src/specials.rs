@@ -136,11 +136,7 @@ pub(crate) fn code<C: Coder>(
         let mut found = 0;
         for (before, column) in present.iter().enumerate() {
             let above = row.checked_sub(1).and_then(|above| all[*column][above]);
-            let left = match found {
-                0 => 0,
-                _ if found == before => 2,
-                _ => 1,
-            };
+            let left = usize::from(found > 0) + usize::from(found > 0 && found == before);
             let special = wanted.and_then(|wanted| wanted[*column][row]);
             let counts = match above {
                 Some(_) => &mut goes_on[usize::from(all_above)],
@@ -193,10 +189,8 @@ pub(crate) fn of(cells: &[Option<f64>]) -> Specials {
 
 /// For which rows the codec has a value.
 pub(crate) fn has_value(specials: &[Option<Special>], rows: usize) -> Vec<bool> {
-    let mut has_value: Vec<bool> = specials
-        .iter()
-        .map(|special| special.is_none_or(Special::has_value))
-        .collect();
+    let own = specials.iter().map(|special| special.is_none_or(Special::has_value));
+    let mut has_value: Vec<bool> = own.collect();
     has_value.resize(rows, true);
     has_value
 }

@@ -38,16 +38,13 @@ struct Stretches {
 
 impl Stretches {
     fn at(&mut self, number: i64) -> &mut Stretch {
+        let whole = |(_, integers): &(_, Option<Integers>)| integers.map(|_| WholeAggregate::default());
         self.found.entry(number).or_insert_with(|| Stretch {
             // The first stretch may begin before the smallest tick.
             tick: number.saturating_mul(self.every),
             rows: 0,
             columns: vec![Aggregate::default(); self.chosen.len()],
-            wholes: self
-                .chosen
-                .iter()
-                .map(|(_, integers)| integers.map(|_| WholeAggregate::default()))
-                .collect(),
+            wholes: self.chosen.iter().map(whole).collect(),
         })
     }
 
@@ -124,7 +121,7 @@ impl<R: Read + Seek> Playback<R> {
         };
         let tolerance = i64::try_from(self.header.schema.time.tolerance()).unwrap_or(i64::MAX);
         let mut blocks = Blocks::new(self, (from, to));
-        while let Some(part) = blocks.part() {
+        while let Some(part) = blocks.part().transpose() {
             let block = part.and_then(|part| match &part {
                 Part::Known(entry) if stretches.merge(entry, tolerance) => Ok(None),
                 _ => blocks.block(part).map(Some),

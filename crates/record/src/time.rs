@@ -48,22 +48,6 @@ const INTEGERS: Target = Target {
 };
 
 impl Grid {
-    /// The grid that follows from the first rows.
-    pub(crate) fn of(ticks: &[i64], rows_per_block: usize, tolerance: u64) -> Self {
-        let even = even(ticks, tolerance).filter(|_| ticks.len() > 1);
-        let step = even.and_then(|(_, span)| {
-            let steps = ticks.len() as i64 - 1;
-            let step = (i128::from(span) + i128::from(steps) / 2).div_euclid(i128::from(steps));
-            i64::try_from(step).ok()
-        });
-        Self {
-            origin: ticks.first().copied().unwrap_or(0),
-            step: step.unwrap_or(0),
-            rows_per_block,
-            tolerance,
-        }
-    }
-
     fn tick(&self, block: u64, row: usize) -> Option<i64> {
         let rows = i128::from(block) * self.rows_per_block as i128 + row as i128;
         i64::try_from(i128::from(self.origin) + i128::from(self.step) * rows).ok()
@@ -78,9 +62,8 @@ impl Grid {
 
     /// The ticks of a block that is on the grid.
     pub(crate) fn ticks(&self, block: u64, rows: usize) -> Result<Vec<i64>, Damage> {
-        self.on_grid(block, rows)
-            .map(Iterator::collect)
-            .ok_or(Damage::Content("ticks"))
+        let ticks = self.on_grid(block, rows).map(Iterator::collect);
+        ticks.ok_or(Damage::Content("ticks"))
     }
 
     /// The block number, if the ticks are on the grid.
@@ -121,6 +104,14 @@ fn even(ticks: &[i64], tolerance: u64) -> Option<(i64, i64)> {
         even_tick(first, span, row, ticks.len()).is_some_and(|even| even.abs_diff(*tick) <= tolerance)
     };
     ticks.iter().enumerate().all(fits).then_some((first, span))
+}
+
+/// The step of the grid that follows from the first ticks; 0 for none.
+pub(crate) fn step(ticks: &[i64], tolerance: u64) -> i64 {
+    let steps = ticks.len() as i128 - 1;
+    let even = even(ticks, tolerance).filter(|_| steps > 0);
+    let step = even.and_then(|(_, span)| i64::try_from((i128::from(span) + steps / 2).div_euclid(steps)).ok());
+    step.unwrap_or(0)
 }
 
 /// The stored form of at least one tick: its kind and its bytes.
@@ -186,16 +177,11 @@ fn coded_in(ticks: &[i64], grid: &Grid, scale: u64, unit: i128) -> Option<Vec<u8
 pub(crate) fn decode(kind: TimeKind, bytes: &mut Bytes<'_>, rows: usize, grid: &Grid) -> Result<Vec<i64>, Damage> {
     let beyond = Damage::Content("ticks");
     match kind {
-        TimeKind::Grid => {
-            let block = bytes.varint()?;
-            grid.ticks(block, rows)
-        }
+        TimeKind::Grid => grid.ticks(bytes.varint()?, rows),
         TimeKind::Even => {
-            let start = grid.origin.wrapping_add(bytes.signed()?);
-            let span = bytes.signed()?;
-            (0..rows)
-                .map(|row| even_tick(start, span, row, rows).ok_or(beyond))
-                .collect()
+            let (start, span) = (grid.origin.wrapping_add(bytes.signed()?), bytes.signed()?);
+            let tick = |row| even_tick(start, span, row, rows).ok_or(beyond);
+            (0..rows).map(tick).collect()
         }
         TimeKind::Coded => {
             let start = i128::from(grid.origin.wrapping_add(bytes.signed()?));
@@ -209,20 +195,12 @@ pub(crate) fn decode(kind: TimeKind, bytes: &mut Bytes<'_>, rows: usize, grid: &
                 let ahead = (scale * i128::from(number as i64)).checked_add(mean * row as i128)?;
                 i64::try_from(start.checked_add(ahead)?).ok()
             };
-            numbers
-                .into_iter()
-                .enumerate()
-                .map(|pair| tick(pair).ok_or(beyond))
-                .collect()
+            let ticks: Option<_> = numbers.into_iter().enumerate().map(tick).collect();
+            ticks.ok_or(beyond)
         }
         TimeKind::Raw => {
-            let all = bytes.take(rows.checked_mul(8).ok_or(beyond)?)?;
-            Ok(all
-                .as_chunks::<8>()
-                .0
-                .iter()
-                .map(|chunk| i64::from_le_bytes(*chunk))
-                .collect())
+            let (all, _) = bytes.take(rows.checked_mul(8).ok_or(beyond)?)?.as_chunks();
+            Ok(all.iter().map(|tick| i64::from_le_bytes(*tick)).collect())
         }
     }
 }

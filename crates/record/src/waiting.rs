@@ -4,7 +4,7 @@ use crate::block::{Cells, Rows};
 use crate::header::Header;
 use crate::ranges::Ranges;
 use crate::schema::Schema;
-use fewbits_block_codec::{ArgumentError, Effort};
+use fewbits_block_codec::{ArgumentError, Effort, ensure};
 
 /// Rows in the order of their arrival.
 #[derive(Debug)]
@@ -35,20 +35,12 @@ impl Waiting {
         rows: usize,
     ) -> Result<(), ArgumentError> {
         let (found, columns) = (lengths.len(), self.columns.len());
-        if found != columns {
-            let expected = format!("{columns}, one per column");
-            let what = if argument == "row" { "cells" } else { "columns" };
-            return Err(ArgumentError::new(argument, format!("{found} {what}"), expected));
+        let what = if argument == "row" { "cells" } else { "columns" };
+        ensure!(found == columns, argument, format!("{found} {what}"), format!("{columns}, one per column"));
+        for length in lengths {
+            ensure!(length == rows, argument, format!("a column of {length} cells"), format!("{rows}, one per tick"));
         }
-        let mut lengths = lengths;
-        match lengths.find(|length| *length != rows) {
-            Some(length) => Err(ArgumentError::new(
-                argument,
-                format!("a column of {length} cells"),
-                format!("{rows}, one per tick"),
-            )),
-            None => Ok(()),
-        }
+        Ok(())
     }
 
     /// Adds rows by columns, of each as many cells as ticks.

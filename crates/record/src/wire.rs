@@ -37,16 +37,17 @@ pub(crate) fn checked(check: u32, head: &[u8], content: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Reads what [`checked`] wrote with a head of this length: the content, and the length of the whole record.
+/// Reads what [`checked`] wrote with a head of this length: the content, and the length of the whole record. `sum` gives the checksum of the first
+/// bytes.
 ///
 /// # Errors
 /// [`Damage::CutOff`] if the slice ends before the record, [`Damage::NoBlock`] if its length is not one of `lengths`, and
 /// [`Damage::Checksum`]. The length is verified first, so that damaged bytes never let a reader wait for a record without end.
 pub(crate) fn read_checked(
-    check: u32,
     bytes: &[u8],
     head: usize,
     lengths: RangeInclusive<usize>,
+    sum: impl FnOnce(&[u8]) -> u32,
 ) -> Result<(&[u8], usize), Damage> {
     let mut reader = Bytes(bytes);
     reader.take(head)?;
@@ -57,9 +58,14 @@ pub(crate) fn read_checked(
     ensure!(lengths.contains(&length), Damage::NoBlock);
     let content = reader.take(length)?;
     let end = bytes.len() - reader.0.len();
-    let sum = u32::from_le_bytes(reader.array::<CHECK_BYTES>()?);
-    ensure!(sum == checksum(&[&check.to_le_bytes(), &bytes[..end]]), Damage::Checksum);
+    let stored = u32::from_le_bytes(reader.array::<CHECK_BYTES>()?);
+    ensure!(stored == sum(&bytes[..end]), Damage::Checksum);
     Ok((content, end + CHECK_BYTES))
+}
+
+/// A flag that is given, or none.
+pub(crate) fn flag<T: Default>(given: bool, flag: T) -> T {
+    if given { flag } else { T::default() }
 }
 
 /// The first three bytes of a bound, highest first.

@@ -35,19 +35,11 @@ pub(super) const CODES: usize = CONTEXTS * SYMBOLS;
 const fn behind_difference(context: usize, symbol: usize) -> usize {
     let is_run = context < RUNS;
     let is_turn = symbol < ZERO && !is_run;
+    let sign = if is_run { 0 } else { 2 - is_turn as usize };
     match symbol.abs_diff(ZERO) {
         0 if is_run => context.saturating_sub(1),
         0 => RUNS - 1,
-        size @ 1..=2 => {
-            RUNS + 3 * (size - 1)
-                + if is_run {
-                    0
-                } else if is_turn {
-                    1
-                } else {
-                    2
-                }
-        }
+        size @ 1..=2 => RUNS + 3 * (size - 1) + sign,
         3 => 13 - is_turn as usize,
         ZERO => CONTEXTS - 1,
         _ => CONTEXTS - 1 - is_turn as usize,
@@ -55,14 +47,24 @@ const fn behind_difference(context: usize, symbol: usize) -> usize {
 }
 
 const fn behind_value(symbol: usize) -> usize {
-    let class = match symbol.abs_diff(ZERO) {
-        size @ 0..=4 => size,
+    let size = symbol.abs_diff(ZERO);
+    let class = if size < 10 { size_class(size) } else { 7 };
+    match symbol {
+        ESCAPE => CONTEXTS - 1,
+        1..ZERO => 7 - class,
+        _ => 7 + class,
+    }
+}
+
+/// The class of a size of values: 0 to 4, 5 to 6, 7 to 9, 10 to 13, more.
+pub(crate) const fn size_class(size: usize) -> usize {
+    match size {
+        0..=4 => size,
         5..=6 => 5,
         7..=9 => 6,
-        ZERO => return CONTEXTS - 1,
-        _ => 7,
-    };
-    if symbol < ZERO { 7 - class } else { 7 + class }
+        10..=13 => 7,
+        _ => 8,
+    }
 }
 
 /// The contexts behind symbols of differences, and of values: at `SYMBOLS context + symbol`.

@@ -1,32 +1,26 @@
 //! A reader's lane: its context, and the sums of what it read.
 
 use super::alphabet::{LARGEST_SIZE, SIZE_FIELD, SMALLEST, ZERO, first_context};
+use super::order::{Sums, VALUES};
 use super::weights::{Entries, SLOT_BITS};
 use super::words::Words;
 use crate::rows::LARGEST;
 
-/// What is coded of an index, as a parameter of loops.
-pub(super) const VALUES: u8 = 0;
-pub(super) const FIRST: u8 = 1;
-pub(super) const SECOND: u8 = 2;
-
-/// What a lane's reader knows besides its state.
+/// What a lane's reader knows besides its state. `ORDER` is the kind of an order.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lane<const ORDER: u8> {
     /// First slot of the table of its context.
     table: usize,
     /// -1 if differences are turned, otherwise 0.
     turn: i64,
-    slope: i64,
-    sum: i64,
+    sums: Sums,
 }
 
 impl<const ORDER: u8> Lane<ORDER> {
     pub(super) const START: Self = Self {
         table: first_context(ORDER == VALUES) << SLOT_BITS,
         turn: 0,
-        slope: 0,
-        sum: 0,
+        sums: Sums::START,
     };
 
     /// The next value, or the sum of all differences, or of all sums.
@@ -54,18 +48,10 @@ impl<const ORDER: u8> Lane<ORDER> {
             cell
         };
         let difference = (turned ^ self.turn) - self.turn;
-        if ORDER == VALUES {
-            return difference;
+        if ORDER != VALUES {
+            self.turn ^= cell >> 63;
         }
-        self.turn ^= cell >> 63;
-        if ORDER == FIRST {
-            self.sum = self.sum.wrapping_add(difference);
-        } else {
-            const { assert!(ORDER == FIRST || ORDER == SECOND || ORDER == VALUES) };
-            self.slope = self.slope.wrapping_add(difference);
-            self.sum = self.sum.wrapping_add(self.slope);
-        }
-        self.sum
+        self.sums.add(ORDER, difference)
     }
 }
 

@@ -1,6 +1,6 @@
 //! The writer's lanes: symbols of all rows and their counts, then from the last row to the first the words.
 
-use super::alphabet::{CODES, CONTEXTS, ESCAPE, SIZE_FIELD, SMALLEST, SYMBOLS, first_context, next_context, symbol};
+use super::alphabet::{CODES, ESCAPE, SIZE_FIELD, SMALLEST, SYMBOLS, first_context, next_context, symbol};
 use super::weights::{Counts, SLOT_BITS, SLOTS, Tables};
 use super::words::{LANES, LOW, WORD_BITS, stretches};
 use crate::vectors::narrow;
@@ -79,13 +79,8 @@ impl Symbols {
 
     /// How often each context has each symbol.
     pub(super) fn counts(&self) -> Counts {
-        let [mut all, others @ ..] = self.counts;
-        for other in &others {
-            all.iter_mut().zip(other).for_each(|(own, other)| *own += other);
-        }
-        let mut counts = [[0; SYMBOLS]; CONTEXTS];
-        counts.as_flattened_mut().copy_from_slice(&all);
-        counts
+        let all = |code: usize| self.counts.iter().map(|counts| counts[code]).sum();
+        std::array::from_fn(|context| std::array::from_fn(|symbol| all(SYMBOLS * context + symbol)))
     }
 
     /// The words of all rows. `turned`: the differences as [`new`](Self::new) left them.

@@ -23,7 +23,7 @@
 //! all words in front of the tail are read, the states of the lanes 1 to 3 are `2^16` more than numbers of 16 bits, and the tail reads these
 //! three as words before those that are left. Its state is that of lane 0. It begins with `p` words that are zero, and ends with the state 1.
 
-mod alphabet;
+pub(crate) mod alphabet;
 mod lane;
 mod lanes;
 pub(crate) mod order;
@@ -37,14 +37,13 @@ use crate::arithmetic::{Coder, Reader, Writer};
 use crate::bytes::{Bytes, push_varint};
 use crate::error::{Damaged, ensure};
 use crate::indices::code_first;
-use crate::rows::{LARGEST, damaged};
 use crate::vectors::narrow;
-use lane::{FIRST, Lane, SECOND, VALUES};
+use lane::Lane;
 use lanes::Symbols;
-use order::Order;
+use order::{FIRST, Order, SECOND, VALUES};
 pub(crate) use plan::{Plan, pco_order, sample_bits};
 use weights::{Entries, Tables};
-use words::{HEAD_BITS, LANES, PAD_BITS, STRETCH, Words, cut_off, stretches};
+use words::{HEAD_BITS, LANES, PAD_BITS, STRETCH, Words, stretches};
 
 /// Rows for which memory is reserved in advance, for each word.
 const ROWS_OF_A_WORD: usize = 64;
@@ -65,7 +64,7 @@ const LOW_FIELD: u32 = 6;
 const ORDER_FIELD: u32 = 2;
 
 /// What is stored before the tables.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Start {
     first: i64,
     order: Order,
@@ -74,40 +73,24 @@ struct Start {
 }
 
 impl Start {
-    fn code<C: Coder>(coder: &mut C, wanted: Option<Self>) -> Result<Self, Damaged> {
-        let (first, mut has_rests) = code_first(coder, wanted.map(|start| start.first), false)?;
-        let told = match wanted.map(|start| start.order) {
-            Some(Order::Second) => 1,
-            Some(Order::Values { .. }) => 2,
-            _ => 0,
-        };
-        let told = coder.raw(told, ORDER_FIELD);
-        let low = coder.raw(wanted.map_or(0, |start| u64::from(start.low)), LOW_FIELD) as u32;
-        let order = match (told, wanted.map(|start| start.order)) {
-            (0, _) => Order::First,
-            (1, _) => Order::Second,
-            (2, own) => {
-                let centre = if let Some(Order::Values { centre }) = own {
-                    centre
-                } else {
-                    0
-                };
-                let (centre, rests) = code_first(coder, own.map(|_| centre), false)?;
-                has_rests |= rests;
-                Order::Values { centre }
-            }
-            _ => return Err(Damaged::new("order", told, "0 to 2")),
-        };
-        if has_rests || low > MOST_LOW {
-            let expected = "at most 47, behind a first index of at most 2^46 in size";
-            return Err(Damaged::new("low bits", low, expected));
+    /// Codes this start; a reader may be given any.
+    fn code<C: Coder>(self, coder: &mut C) -> Result<Self, Damaged> {
+        let (first, mut has_rests) = code_first(coder, Some(self.first), false)?;
+        let kind = coder.raw(self.order.kind.into(), ORDER_FIELD) as u8;
+        ensure!(kind <= VALUES, Damaged::new("order", kind, "0 to 2"));
+        let low = coder.raw(self.low.into(), LOW_FIELD) as u32;
+        let mut centre = 0;
+        if kind == VALUES {
+            let (found, rests) = code_first(coder, Some(self.order.centre), false)?;
+            (centre, has_rests) = (found, has_rests | rests);
         }
-        let tail = coder.raw(wanted.map_or(0, |start| u64::from(start.tail)), TAIL_FIELD) as u32;
+        let expected = "at most 47, behind a first index of at most 2^46 in size";
+        ensure!(!has_rests && low <= MOST_LOW, Damaged::new("low bits", low, expected));
         Ok(Self {
             first,
-            order,
+            order: Order { kind, centre },
             low,
-            tail,
+            tail: coder.raw(self.tail.into(), TAIL_FIELD) as u32,
         })
     }
 
@@ -134,14 +117,14 @@ pub(crate) fn write(indices: &[i64], plan: &Plan, mut bytes: Vec<u8>) -> Result<
         tail,
     };
     let stretched = start.stretched(rows);
-    let symbols = narrow!(match order {
-        Order::Values { .. } => Symbols::new::<true>(&mut differences, stretched, low),
+    let symbols = narrow!(match order.kind {
+        VALUES => Symbols::new::<true>(&mut differences, stretched, low),
         _ => Symbols::new::<false>(&mut differences, stretched, low),
     });
     let counts = symbols.counts();
     let tables = narrow!(Tables::of(&counts));
     let stored = Writer::all(Vec::new(), |writer| {
-        Start::code(writer, Some(start))?;
+        start.code(writer)?;
         Tables::code(writer, Some(&tables))
     })?;
     let coded = symbols.encoded(&tables, &differences, low);
@@ -160,18 +143,17 @@ pub(crate) fn read(bytes: &[u8], rows: usize) -> Result<Vec<i64>, Damaged> {
     let head = bytes.varint()?;
     let stored = bytes.take(usize::try_from(head >> HEAD_BITS).unwrap_or(usize::MAX))?;
     let (start, tables) =
-        Reader::all(stored, |reader| Ok::<_, Damaged>((Start::code(reader, None)?, Tables::code(reader, None)?)))?;
-    let is_of_values = matches!(start.order, Order::Values { .. });
+        Reader::all(stored, |reader| Ok::<_, Damaged>((Start::default().code(reader)?, Tables::code(reader, None)?)))?;
     let block = Block {
         start,
-        entries: tables.entries(is_of_values),
+        entries: tables.entries(start.order.kind == VALUES),
         head,
     };
-    match (start.order, start.low) {
-        (Order::Values { .. }, _) => block.rest::<true, VALUES>(rows, bytes),
-        (Order::Second, _) => block.rest::<true, SECOND>(rows, bytes),
-        (Order::First, 0) => block.rest::<false, FIRST>(rows, bytes),
-        (Order::First, _) => block.rest::<true, FIRST>(rows, bytes),
+    match (start.order.kind, start.low) {
+        (VALUES, _) => block.rest::<true, VALUES>(rows, bytes),
+        (SECOND, _) => block.rest::<true, SECOND>(rows, bytes),
+        (_, 0) => block.rest::<false, FIRST>(rows, bytes),
+        (_, _) => block.rest::<true, FIRST>(rows, bytes),
     }
 }
 
@@ -186,7 +168,7 @@ struct Block {
 impl Block {
     /// All indices.
     fn rest<const LOW_BITS: bool, const ORDER: u8>(&self, rows: usize, bytes: Bytes<'_>) -> Result<Vec<i64>, Damaged> {
-        let (mut states, mut words) = Words::begun(bytes, self.head >> PAD_BITS & 3)?;
+        let (mut states, mut words) = Words::begun(bytes, self.head)?;
         // Memory for all rows at once where so few bytes may hold them: a damaged number of rows takes no more than its bytes.
         let mut indices = Vec::with_capacity(rows.min(1 + ROWS_OF_A_WORD * (words.count() + LANES)));
         indices.push(self.start.first);
@@ -196,53 +178,15 @@ impl Block {
             narrow!(self.stretch::<LOW_BITS, ORDER>(&mut words, &mut states, found));
             words.check(&states)?;
             for found in found.chunks(length) {
-                self.push::<ORDER>(&mut indices, found)?;
+                self.start.order.push(&mut indices, found)?;
             }
         }
-        let late = words.late(&states)?;
-        let (mut words, mut state) = (Words::new(&late), states[0]);
-        let pads = words.pads(&mut state, self.head);
         let mut lane = Lane::<ORDER>::START;
-        let found: Vec<i64> = (indices.len()..rows)
-            .map(|_| lane.read::<LOW_BITS>(&self.entries, &mut state, &mut words, self.start.low))
-            .collect();
-        self.push::<ORDER>(&mut indices, &found)?;
-        if words.is_ended(pads, state) {
-            Ok(indices)
-        } else {
-            Err(cut_off())
-        }
-    }
-
-    /// Appends the indices of a stretch: its sums, which begin with zero, and what they continue.
-    fn push<const ORDER: u8>(&self, indices: &mut Vec<i64>, sums: &[i64]) -> Result<(), Damaged> {
-        let last = indices[indices.len() - 1];
-        let slope = last - indices[indices.len().max(2) - 2];
-        let (base, slope) = match self.start.order {
-            Order::Values { centre } => (centre, 0),
-            Order::First => (last, 0),
-            Order::Second => (last, slope),
-        };
-        // Differences that no writer writes may have sums beyond 64 bits, and then any indices.
-        let begun = indices.len();
-        if ORDER == SECOND {
-            let lines = (1_i64..).map(|row| base.wrapping_add(slope.wrapping_mul(row)));
-            indices.extend(sums.iter().zip(lines).map(|(sum, line)| sum.wrapping_add(line)));
-        } else {
-            indices.extend(sums.iter().map(|sum| sum.wrapping_add(base)));
-        }
-        let found = &indices[begun..];
-        // Bits of all sizes together.
-        if found.iter().fold(0, |bits, index| bits | index ^ index >> 63) >= 2 * LARGEST {
-            return Err(damaged(
-                found
-                    .iter()
-                    .copied()
-                    .max_by_key(|index| index.unsigned_abs())
-                    .unwrap_or(0),
-            ));
-        }
-        Ok(())
+        let found = words.tail(&states, self.head, rows - indices.len(), |state, words| {
+            lane.read::<LOW_BITS>(&self.entries, state, words, self.start.low)
+        })?;
+        self.start.order.push(&mut indices, &found)?;
+        Ok(indices)
     }
 
     /// The sums of the differences of four stretches, one behind the other.

@@ -3,7 +3,7 @@
 use super::SIZE_BITS;
 use super::alphabet::{CODES, ESCAPE, SIZE_FIELD, SMALLEST, SYMBOLS};
 use super::lanes::Place;
-use super::order::Order;
+use super::order::{FIRST, Order, SECOND, VALUES};
 use crate::error::Damaged;
 use crate::indices::{LEVEL, to_wrapped_pco};
 use fewbits_node::elementary::log2;
@@ -49,7 +49,7 @@ fn size((_, parts): &Coded) -> usize {
 
 /// The best plan for differences, or for their differences if these are smaller.
 fn of_differences(indices: &[i64]) -> (Plan, usize) {
-    let [first, second] = [Order::First, Order::Second].map(|order| coded(order, indices));
+    let [first, second] = [FIRST, SECOND].map(|kind| coded(Order { kind, centre: 0 }, indices));
     let own = Plan::of(&first);
     if size(&second) >= size(&first) {
         return (own, size(&first));
@@ -127,7 +127,9 @@ pub(crate) fn pco_order(indices: &[i64]) -> (usize, f32) {
                 best = (order, bits);
             }
         }
-        parts.iter_mut().for_each(|part| *part = Order::First.differences(part));
+        parts
+            .iter_mut()
+            .for_each(|part| *part = Order::default().differences(part));
     }
     best
 }
@@ -145,8 +147,8 @@ impl Plan {
         let (sum, rows) = parts(indices)
             .flatten()
             .fold((0_i128, 0), |(sum, rows), index| (sum + i128::from(*index), rows + 1));
-        let centre = (sum / rows) as i64;
-        let values = coded(Order::Values { centre }, indices);
+        let (kind, centre) = (VALUES, (sum / rows) as i64);
+        let values = coded(Order { kind, centre }, indices);
         let (own, size_of_differences) = of_differences(indices);
         if size(&values) < size_of_differences + MORE_BITS * rows as usize {
             own.shorter(Self::of(&values))
@@ -185,15 +187,12 @@ impl Plan {
         let plan = |low| Self {
             order: *order,
             low,
-            bits: match order {
-                Order::Values { .. } => estimated_bits::<true>(parts, low),
+            bits: match order.kind {
+                VALUES => estimated_bits::<true>(parts, low),
                 _ => estimated_bits::<false>(parts, low),
             },
         };
-        if usual < low {
-            plan(low).shorter(plan(usual))
-        } else {
-            plan(low)
-        }
+        let own = plan(low);
+        if usual < low { own.shorter(plan(usual)) } else { own }
     }
 }

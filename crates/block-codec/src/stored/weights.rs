@@ -19,7 +19,7 @@ use super::words::fill_slots;
 use crate::arithmetic::Coder;
 use crate::counts::Count;
 use crate::error::{Damaged, ensure};
-use crate::groups::joined;
+use crate::groups::{joined, sums};
 use fewbits_node::elementary::log2;
 
 /// A table has `2^SLOT_BITS` slots.
@@ -50,44 +50,6 @@ pub(super) struct Tables {
     weights: Vec<[u8; SYMBOLS]>,
 }
 
-/// Contexts that share a table.
-struct Group {
-    contexts: usize,
-    counts: [u32; SYMBOLS],
-    bits: f32,
-}
-
-impl Group {
-    /// A group of so many contexts with its estimated bits.
-    #[inline(always)]
-    fn new(contexts: usize, counts: [u32; SYMBOLS], bits_of_table: f32) -> Self {
-        let (mut sum, mut own, mut used) = (0, 0.0, 0.0);
-        for count in counts {
-            sum += count;
-            let number = count.max(1) as f32;
-            own += number * log2(number);
-            used += f32::from(u8::from(count > 0));
-        }
-        let all = sum.max(1) as f32;
-        let bits = if sum > 0 {
-            all * log2(all) - own + BITS_OF_USED * used + bits_of_table
-        } else {
-            1.0
-        };
-        Self { contexts, counts, bits }
-    }
-
-    #[inline(always)]
-    fn joined(&self, other: &Self, bits_of_table: f32) -> Self {
-        let mut counts = self.counts;
-        counts
-            .iter_mut()
-            .zip(other.counts)
-            .for_each(|(own, other)| *own += other);
-        Self::new(self.contexts + other.contexts, counts, bits_of_table)
-    }
-}
-
 impl Tables {
     /// The tables for these counts: starting with one for each context, the two neighbours that save most bits together are joined as
     /// long as any do.
@@ -97,29 +59,32 @@ impl Tables {
         let lowest = (1..ZERO).find(is_used).unwrap_or(ZERO);
         let highest = (ZERO + 1..SYMBOLS).rev().find(is_used).unwrap_or(ZERO);
         let bits_of_table = BITS_OF_ANY * (highest - lowest) as f32;
-        let groups = counts
-            .iter()
-            .map(|counts| Group::new(1, *counts, bits_of_table))
-            .collect();
-        let groups = joined(groups, |group| group.bits, 0.0, |a, b| a.joined(b, bits_of_table));
+        let bits = |_, counts: &[u32; SYMBOLS]| {
+            let (sum, logs) = sums(counts);
+            let used = counts
+                .iter()
+                .fold(0.0, |used, count| used + f32::from(u8::from(*count > 0)));
+            if sum > 0.0 {
+                sum * log2(sum) - logs + BITS_OF_USED * used + bits_of_table
+            } else {
+                1.0
+            }
+        };
+        let groups = joined(counts.iter().map(|counts| (1, *counts)), bits, 0.0);
         let largest = groups.iter().flat_map(|group| group.counts).max().unwrap_or(0) as f32;
         let share = 1.0 / ROWS_OF_ONE.max(largest / (LARGEST_WEIGHT * LARGEST_WEIGHT) as f32);
-        let weight = |count: u32| ((count as f32 * share).sqrt() + 0.5) as u32;
-        let weights = groups.iter().map(|group| {
-            group
-                .counts
-                .map(|count| weight(count).clamp(count.min(1), LARGEST_WEIGHT) as u8)
-        });
-        let mut table_of = [0; CONTEXTS];
-        let tables = groups
-            .iter()
-            .enumerate()
-            .flat_map(|(at, group)| std::iter::repeat_n(at, group.contexts));
-        table_of.iter_mut().zip(tables).for_each(|(own, table)| *own = table);
+        let root = |count: u32| ((count as f32 * share).sqrt() + 0.5) as u32;
+        let weight = |count: u32| root(count).clamp(count.min(1), LARGEST_WEIGHT) as u8;
+        let (mut table_of, mut weights, mut begun) = ([0; CONTEXTS], Vec::new(), 0);
+        for group in groups {
+            table_of[begun..begun + group.size].fill(weights.len());
+            weights.push(group.counts.map(weight));
+            begun += group.size;
+        }
         Self {
             sizes: [ZERO - lowest, highest - ZERO],
             table_of,
-            weights: weights.collect(),
+            weights,
         }
     }
 
@@ -133,7 +98,7 @@ impl Tables {
             let is_joined = join.decide(coder, own);
             table_of[context] = table_of[context - 1] + usize::from(!is_joined);
         }
-        let mut weight_coder = WeightCoder::new();
+        let mut weight_coder = WeightCoder::NEW;
         let mut weights: Vec<[u8; SYMBOLS]> = Vec::with_capacity(CONTEXTS);
         for table in 0..=table_of[CONTEXTS - 1] {
             let own = wanted.map(|tables| &tables.weights[table]);
@@ -182,12 +147,10 @@ struct WeightCoder {
 }
 
 impl WeightCoder {
-    fn new() -> Self {
-        Self {
-            lengths: [[Count::NEW; WEIGHT_BITS]; WEIGHT_BITS + 1],
-            seconds: [Count::NEW; WEIGHT_BITS + 1],
-        }
-    }
+    const NEW: Self = Self {
+        lengths: [[Count::NEW; WEIGHT_BITS]; WEIGHT_BITS + 1],
+        seconds: [Count::NEW; WEIGHT_BITS + 1],
+    };
 
     /// Codes the weights of one table.
     fn code<C: Coder>(

@@ -43,7 +43,7 @@ pub(crate) fn fill_slots(widths: &mut [u32], slots: usize) {
     }
 }
 
-pub(crate) fn cut_off() -> Damaged {
+fn cut_off() -> Damaged {
     Damaged::new("block", "other words", "those that a writer of as many rows wrote")
 }
 
@@ -56,7 +56,7 @@ pub(crate) struct Words<'a> {
 }
 
 impl<'a> Words<'a> {
-    pub(crate) fn new(words: &'a [[u8; 2]]) -> Self {
+    fn new(words: &'a [[u8; 2]]) -> Self {
         Self {
             words,
             position: 0,
@@ -69,18 +69,15 @@ impl<'a> Words<'a> {
         self.broken = true;
     }
 
-    /// The states of the lanes and the words behind them, whose number modulo 4 is stated.
-    pub(crate) fn begun(mut bytes: Bytes<'a>, count: u64) -> Result<([u32; LANES], Self), Damaged> {
+    /// The states of the lanes and the words behind them, whose number modulo 4 the head states.
+    pub(crate) fn begun(mut bytes: Bytes<'a>, head: u64) -> Result<([u32; LANES], Self), Damaged> {
         let mut states = [0; LANES];
         for state in &mut states {
             *state = u32::from_le_bytes(bytes.array()?);
         }
         let (words, odd) = bytes.0.as_chunks();
-        if odd.is_empty() && words.len() as u64 % 4 == count {
-            Ok((states, Self::new(words)))
-        } else {
-            Err(cut_off())
-        }
+        ensure!(odd.is_empty() && words.len() as u64 % 4 == head >> PAD_BITS & 3, cut_off());
+        Ok((states, Self::new(words)))
     }
 
     /// Number of all words.
@@ -94,26 +91,25 @@ impl<'a> Words<'a> {
         Ok(())
     }
 
-    /// The words of the tail: those that the states of the lanes 1 to 3 hold, and those that were not read.
-    pub(crate) fn late(&self, states: &[u32; LANES]) -> Result<Vec<[u8; 2]>, Damaged> {
-        let held = &states[1..];
+    /// The rows of the tail, one by one as `read` reads them from its state and words: those that the states of the lanes 1 to 3 hold, and those
+    /// that were not read. The head states how many pads, which are zero, come before them.
+    pub(crate) fn tail(
+        self,
+        states: &[u32; LANES],
+        head: u64,
+        rows: usize,
+        mut read: impl FnMut(&mut u32, &mut Words<'_>) -> i64,
+    ) -> Result<Vec<i64>, Damaged> {
+        let ([mut state, held @ ..], rest) = (*states, &self.words[self.position..]);
         ensure!(held.iter().all(|state| *state < 2 * LOW), cut_off());
-        let rest = self.words[self.position..].iter().copied();
-        Ok(held
-            .iter()
-            .map(|state| (*state as u16).to_le_bytes())
-            .chain(rest)
-            .collect())
-    }
-
-    /// Whether a tail that began with this word for pads ended as writers end it.
-    pub(crate) fn is_ended(&self, pads: u64, state: u32) -> bool {
-        pads == 0 && !self.broken && self.position == self.words.len() && state == 1
-    }
-
-    /// All pads together, of the number in the head.
-    pub(crate) fn pads(&mut self, state: &mut u32, head: u64) -> u64 {
-        (0..head & ((1 << PAD_BITS) - 1)).fold(0, |all, _| all | self.raw(state, WORD_BITS))
+        let held = held.map(|state| (state as u16).to_le_bytes());
+        let all = [&held, rest].concat();
+        let mut words = Words::new(&all);
+        let pads = (0..head & ((1 << PAD_BITS) - 1)).fold(0, |all, _| all | words.raw(&mut state, WORD_BITS));
+        let found = (0..rows).map(|_| read(&mut state, &mut words)).collect();
+        let is_ended = pads == 0 && !words.broken && words.position == words.words.len() && state == 1;
+        ensure!(is_ended, cut_off());
+        Ok(found)
     }
 
     #[inline(always)]

@@ -77,10 +77,10 @@ pub(crate) fn max_bytes(header: &Header) -> usize {
     64 + 32 * header.schema.columns.len() + 24 * cells
 }
 
-/// The length in bytes of the block that begins here.
+/// The length in bytes of the block that begins here. `sum` gives the checksum of the first bytes.
 ///
 /// # Errors
 /// [`Damage::CutOff`] if the slice ends before the block does; others if no block begins here.
-pub(crate) fn length(header: &Header, bytes: &[u8]) -> Result<usize, Damage> {
-    Ok(read_checked(header.check, bytes, 0, 1..=max_bytes(header))?.1)
+pub(crate) fn length(header: &Header, bytes: &[u8], sum: impl FnOnce(&[u8]) -> u32) -> Result<usize, Damage> {
+    Ok(read_checked(bytes, 0, 1..=max_bytes(header), sum)?.1)
 }

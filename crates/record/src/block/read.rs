@@ -154,14 +154,11 @@ pub(crate) fn decode_content(header: &Header, content: &[u8], wanted: impl Fn(us
     }
     let mut decoded: Vec<Cells> = Vec::with_capacity(columns);
     for (i, (section, specials)) in sections.iter().zip(&specials).enumerate() {
-        let cells = if !needed[i] {
-            Cells::new()
-        } else if section.id == CodecId::Shared {
-            shared::decode(header, &mut shared, &decoded, specials, rows)?
-        } else {
-            section.cells(header, &decoded, specials, rows)?
-        };
-        decoded.push(cells);
+        decoded.push(match section.id {
+            _ if !needed[i] => Cells::new(),
+            CodecId::Shared => shared::decode(header, &mut shared, &decoded, specials, rows)?,
+            _ => section.cells(header, &decoded, specials, rows)?,
+        });
     }
     if shares && !needed.contains(&false) {
         shared.finish().map_err(|_| Damage::Content("shared code"))?;
@@ -169,15 +166,15 @@ pub(crate) fn decode_content(header: &Header, content: &[u8], wanted: impl Fn(us
     for (_, cells) in decoded.iter_mut().enumerate().filter(|(i, _)| !wanted(*i)) {
         *cells = Cells::new();
     }
+    let share_bound = |(i, section): (usize, &Section<'_>)| match header.schema.columns[i].bound {
+        Bound::ShareOfRange(_) => Some(section.own.unwrap_or(header.share_bounds[i])),
+        _ => None,
+    };
     Ok(Block {
         number,
         ticks,
         columns: decoded,
-        share_bounds: sections
-            .iter()
-            .enumerate()
-            .map(|(i, section)| section.share_bound(header, i))
-            .collect(),
+        share_bounds: sections.iter().enumerate().map(share_bound).collect(),
     })
 }
 
@@ -204,17 +201,12 @@ fn read_section<'a>(
         return Ok(Section { id, own, others, bytes });
     }
     let (own, others) = front(body, column, descriptor, None, &[])?;
-    let length = if has_length {
-        body.count(body.0.len(), "length of a column")?
-    } else {
-        body.0.len()
+    let length = match has_length {
+        true => body.count(body.0.len(), "length of a column")?,
+        false => body.0.len(),
     };
-    Ok(Section {
-        id,
-        own,
-        others,
-        bytes: body.take(length)?,
-    })
+    let bytes = body.take(length)?;
+    Ok(Section { id, own, others, bytes })
 }
 
 /// What stands in front of a column's bytes, as its descriptor says: its own bound, and the columns that it was predicted from.
@@ -258,10 +250,5 @@ impl Section<'_> {
         };
         let values = codec::decode(self.id, self.bytes, count, context)?;
         Ok(specials::merged(specials, &values))
-    }
-
-    fn share_bound(&self, header: &Header, column: usize) -> Option<f64> {
-        let shared = matches!(header.schema.columns[column].bound, Bound::ShareOfRange(_));
-        shared.then(|| self.own.unwrap_or(header.share_bounds[column]))
     }
 }

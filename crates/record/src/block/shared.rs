@@ -83,10 +83,8 @@ pub(super) fn encode(
     // Only a reader can fail here.
     let _ = self::specials(&mut writer, Some(specials), cells.len(), cells[0].len());
     for (column, wanted) in indices.iter().enumerate() {
-        let (Some(wanted), Some(start)) = (wanted, header.start(column, None)) else {
-            continue;
-        };
-        let Some(codec) = adaptive::codec(&header.target(column, None)) else {
+        let codec = adaptive::codec(&header.target(column, None));
+        let (Some(wanted), Some(start), Some(codec)) = (wanted, header.start(column, None), codec) else {
             continue;
         };
         let codec = codec.with_effort(effort);
@@ -119,8 +117,10 @@ pub(super) fn decode(
     let column = before.len();
     let damaged = Damage::Content("shared code");
     let target = header.target(column, None);
-    let (start, codec) = (header.start(column, None), adaptive::codec(&target));
-    let (start, codec) = start.zip(codec).ok_or(damaged)?;
+    let (start, codec) = header
+        .start(column, None)
+        .zip(adaptive::codec(&target))
+        .ok_or(damaged)?;
     let has_value = specials::has_value(specials, rows);
     let count = has_value.iter().filter(|has| **has).count();
     let others = others(reader, column, &[])?;

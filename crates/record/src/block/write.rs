@@ -10,7 +10,7 @@ use crate::header::Header;
 use crate::related;
 use crate::specials::{self, Special, Specials};
 use crate::time::{self, TimeKind};
-use crate::wire::{Bytes, checked, push_varint, written};
+use crate::wire::{Bytes, checked, flag, push_varint, written};
 use fewbits_block_codec::Effort;
 
 struct CodedColumn {
@@ -76,7 +76,6 @@ fn encode_column(
             }
         }
     }
-    let flag = |given: bool, flag: u8| if given { flag } else { 0 };
     let descriptor = coded.id as u8 | flag(own.is_some(), BOUND_FOLLOWS) | flag(!others.is_empty(), OTHERS_FOLLOW);
     let head = written(|fields| front(fields, column, descriptor, own, &others));
     CodedColumn {
@@ -151,7 +150,6 @@ impl Rows<'_> {
             .map(|column| std::mem::take(&mut column.specials))
             .collect();
         let told = !shares && specials.iter().flatten().any(Option::is_some);
-        let flag = |given: bool, flag: u64| if given { flag } else { 0 };
         let flags = kind as u64
             | flag(!whole, ROWS_FOLLOW)
             | flag(!all_plain, DESCRIPTORS_FOLLOW)

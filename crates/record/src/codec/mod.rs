@@ -15,7 +15,8 @@ mod plain;
 mod relative;
 
 use crate::bound::Bound;
-use crate::error::Damage;
+use crate::column::Column;
+use crate::error::{Damage, ensure};
 use fewbits_block_codec::{Effort, Start};
 
 pub(crate) use fewbits_block_codec::JOINT_COLUMNS;
@@ -44,6 +45,12 @@ pub(crate) struct Target {
 }
 
 impl Target {
+    /// That of a column where its share is worth this bound.
+    pub(crate) fn of(column: &Column, share_bound: f64) -> Self {
+        let (bound, period) = (column.bound_in(share_bound), column.period);
+        Self { bound, period }
+    }
+
     pub(crate) fn holds(&self, sample: f64, restored: f64) -> bool {
         self.bound.holds(sample, restored, self.period)
     }
@@ -113,17 +120,10 @@ impl Coded {
             broken,
         })
     }
-
-    fn cost(&self) -> usize {
-        self.bytes.len() + REPAIR_BYTES * self.broken
-    }
 }
 
 /// A short code of the samples, which are all finite. It has been decoded once, so the restored numbers are known.
 pub(crate) fn encode(samples: &[f64], context: Context<'_>, effort: Effort) -> Coded {
-    let constant = plain::constant(samples, context.target)
-        .and_then(|bytes| Coded::verified(CodecId::Constant, bytes, samples, Context::alone(context.target)))
-        .filter(|coded| coded.broken == 0);
     let raw = || Coded {
         id: CodecId::Raw,
         bytes: plain::raw(samples),
@@ -131,15 +131,17 @@ pub(crate) fn encode(samples: &[f64], context: Context<'_>, effort: Effort) -> C
         broken: 0,
         uses_others: false,
     };
-    constant.unwrap_or_else(|| {
-        adaptive::encode(samples, context, effort)
-            .and_then(|(bytes, joint)| {
-                let others = if joint { context.others } else { &[] };
-                Coded::verified(CodecId::Adaptive, bytes, samples, Context { others, ..context })
-            })
-            .filter(|coded| coded.cost() < 8 * samples.len())
-            .unwrap_or_else(raw)
-    })
+    let constant = plain::constant(samples, context.target)
+        .and_then(|bytes| Coded::verified(CodecId::Constant, bytes, samples, Context::alone(context.target)))
+        .filter(|coded| coded.broken == 0);
+    let adaptive = || {
+        let (bytes, joint) = adaptive::encode(samples, context, effort)?;
+        let others = if joint { context.others } else { &[] };
+        let coded = Coded::verified(CodecId::Adaptive, bytes, samples, Context { others, ..context })?;
+        // Broken samples are stored in full.
+        (coded.bytes.len() + REPAIR_BYTES * coded.broken < 8 * samples.len()).then_some(coded)
+    };
+    constant.or_else(adaptive).unwrap_or_else(raw)
 }
 
 /// Decodes `count` finite numbers; `context` must be the one that was passed to [`encode`].
@@ -153,9 +155,6 @@ pub(crate) fn decode(id: CodecId, bytes: &[u8], count: usize, context: Context<'
         CodecId::Adaptive => adaptive::decode(bytes, count, context),
         CodecId::Shared => Err(Damage::Content("codec")),
     }?;
-    if values.iter().all(|value| value.is_finite()) {
-        Ok(values)
-    } else {
-        Err(Damage::Content("values"))
-    }
+    ensure!(values.iter().all(|value| value.is_finite()), Damage::Content("values"));
+    Ok(values)
 }

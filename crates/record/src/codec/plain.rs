@@ -35,16 +35,13 @@ pub(super) fn constant(samples: &[f64], target: &Target) -> Option<Vec<u8>> {
         f64::from_be_bytes(bytes)
     };
     let kept = (0..=8).find(|kept| keeps(short(*kept)));
-    match kept {
-        Some(kept) => Some(middle.to_be_bytes()[..kept].to_vec()),
-        None => keeps(first).then(|| first.to_be_bytes().to_vec()),
-    }
+    let kept = kept.map(|kept| middle.to_be_bytes()[..kept].to_vec());
+    kept.or_else(|| keeps(first).then(|| first.to_be_bytes().to_vec()))
 }
 
 pub(super) fn decode_constant(bytes: &[u8], count: usize) -> Result<Vec<f64>, Damage> {
     let mut all = [0; 8];
-    all.get_mut(..bytes.len())
-        .ok_or(Damage::Content("length of a number"))?
-        .copy_from_slice(bytes);
+    ensure!(bytes.len() <= all.len(), Damage::Content("length of a number"));
+    all[..bytes.len()].copy_from_slice(bytes);
     Ok(vec![f64::from_be_bytes(all); count])
 }

@@ -1,7 +1,7 @@
 //! A piece of the header as a frame.
 
 use crate::error::{Damage, ensure};
-use crate::wire::{Bytes, push_varint, read_checked};
+use crate::wire::{Bytes, Fields, checksum, read_checked, written};
 
 const PIECE: u8 = b'P';
 /// Largest number of bytes of a piece in addition to its part of the header: kind, length and checksum, head, and the number of frames.
@@ -11,7 +11,7 @@ const MAX_COUNT_BYTES: usize = 5;
 const MAX_COUNT: u64 = (1 << 35) - 1;
 
 /// A piece of a header.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Piece<'a> {
     /// The header's checksum.
     pub(super) check: u32,
@@ -24,12 +24,25 @@ pub(super) struct Piece<'a> {
 }
 
 impl<'a> Piece<'a> {
+    /// The fields in front of its bytes; a reader may be given any.
+    fn code<F: Fields>(self, fields: &mut F) -> Result<Self, Damage> {
+        let check = u32::from_le_bytes(fields.bytes(self.check.to_le_bytes())?);
+        let [last, number] = fields.bytes([self.last, self.number])?;
+        ensure!(number <= last, Damage::Content("number of a piece"));
+        let frames = fields.varint(self.frames.min(MAX_COUNT))?;
+        ensure!(frames <= MAX_COUNT, Damage::Content("number of frames"));
+        Ok(Self {
+            check,
+            last,
+            number,
+            frames,
+            ..self
+        })
+    }
+
     pub(super) fn to_frame(self) -> Vec<u8> {
-        let mut content = self.check.to_le_bytes().to_vec();
-        content.extend([self.last, self.number]);
-        push_varint(&mut content, self.frames.min(MAX_COUNT));
-        content.extend_from_slice(self.bytes);
-        crate::index::special(0, PIECE, &content)
+        let content = written(|fields| self.code(fields));
+        crate::index::special(0, PIECE, &[&content, self.bytes].concat())
     }
 
     pub(super) fn is_one(frame: &[u8]) -> bool {
@@ -39,21 +52,13 @@ impl<'a> Piece<'a> {
     pub(super) fn of_frame(frame: &'a [u8]) -> Result<Self, Damage> {
         ensure!(frame.get(1) == Some(&PIECE), Damage::NoBlock);
         // The receiver of a piece has no header yet, so the checksum covers zeros in place of the header's.
-        let (content, whole) = read_checked(0, frame, 2, 0..=frame.len())?;
+        let (content, whole) = read_checked(frame, 2, 0..=frame.len(), |bytes| checksum(&[&[0; 4], bytes]))?;
         ensure!(whole == frame.len(), Damage::Content("length"));
         let mut content = Bytes(content);
-        let check = u32::from_le_bytes(content.array()?);
-        let [last, number] = content.array()?;
-        ensure!(number <= last, Damage::Content("number of a piece"));
-        let frames = content.varint()?;
-        ensure!(frames <= MAX_COUNT, Damage::Content("number of frames"));
-        let bytes = content.0;
+        let piece = Self::default().code(&mut content)?;
         Ok(Self {
-            check,
-            last,
-            number,
-            frames,
-            bytes,
+            bytes: content.0,
+            ..piece
         })
     }
 }

@@ -163,18 +163,14 @@ impl FrameReader {
 
     fn piece(&mut self, piece: Piece<'_>) -> Result<Vec<Block>, Damage> {
         let count = usize::from(piece.last) + 1;
-        let known = self
-            .incomplete
-            .iter()
-            .position(|i| i.check == piece.check && i.pieces.len() == count);
-        let mut incomplete = match known {
-            Some(at) => self.incomplete.remove(at),
-            None => Incomplete {
-                check: piece.check,
-                pieces: vec![None; count],
-                frames: 0,
-            },
+        let is_known = |i: &Incomplete| i.check == piece.check && i.pieces.len() == count;
+        let known = self.incomplete.iter().position(is_known);
+        let new = || Incomplete {
+            check: piece.check,
+            pieces: vec![None; count],
+            frames: 0,
         };
+        let mut incomplete = known.map_or_else(new, |at| self.incomplete.remove(at));
         incomplete.frames = incomplete.frames.max(piece.frames);
         incomplete.pieces[usize::from(piece.number)] = Some(piece.bytes.to_vec());
         let bytes: usize = incomplete.pieces.iter().flatten().map(Vec::len).sum();
@@ -211,6 +207,6 @@ impl FrameReader {
 }
 
 fn read_block(header: &Header, frame: &[u8]) -> Result<Block, Damage> {
-    ensure!(block::length(header, frame)? == frame.len(), Damage::Content("length"));
+    ensure!(block::length(header, frame, |bytes| header.sum(bytes))? == frame.len(), Damage::Content("length"));
     block::decode(header, frame, |_| true)
 }

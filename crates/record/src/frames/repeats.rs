@@ -67,12 +67,11 @@ impl HeaderRepeats {
             Pace::Share(_) => self.frames == 0,
             Pace::Every(every) => self.frames.is_multiple_of(every),
         };
-        let mut all = if is_whole {
-            writer.header_frames_after(self.frames)
-        } else {
-            Vec::new()
-        };
-        self.spend(&all);
+        let mut all = Vec::new();
+        if is_whole {
+            all = writer.header_frames_after(self.frames);
+            self.spend(&all);
+        }
         self.bytes.0 += frame.len();
         self.frames += 1;
         all.push(frame);
@@ -93,9 +92,8 @@ impl HeaderRepeats {
 
     /// What is sent after the last frame. A reader then knows how many frames there were.
     pub fn at_end(&mut self, writer: &FrameWriter) -> Vec<Vec<u8>> {
-        let all = (0..AT_END)
-            .flat_map(|_| writer.header_frames_after(self.frames))
-            .collect::<Vec<_>>();
+        let whole = writer.header_frames_after(self.frames);
+        let all: Vec<_> = std::iter::repeat_n(whole, AT_END).flatten().collect();
         self.spend(&all);
         all
     }

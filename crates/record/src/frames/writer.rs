@@ -31,6 +31,10 @@ pub struct FrameWriter {
     frames: u64,
 }
 
+fn of_no_rows(schema: &Schema) -> Header {
+    Header::new(schema.clone(), &[], vec![0.0; schema.columns.len()])
+}
+
 impl FrameWriter {
     /// A writer of frames of at most `max_bytes` bytes, and at most the schema's rows per block, 512 rows or 2^17 cells: rows of a signal
     /// that stands still wait no longer.
@@ -43,7 +47,7 @@ impl FrameWriter {
         // Receivers that print name the times as they like.
         schema.time_name.clear();
         // Origin and step of rows take at most 18 bytes more than those of no rows.
-        let header = Header::new(schema.clone(), &[], vec![0.0; columns]).to_bytes().len() + 32 + MAX_START * columns;
+        let header = of_no_rows(&schema).to_bytes().len() + 32 + MAX_START * columns;
         let least = (header.div_ceil(MAX_PIECES) + PIECE_OVERHEAD).max(MIN_FRAME_BYTES);
         ensure!(max_bytes >= least, "max_bytes", max_bytes, format!("at least {least} for this header"));
         Ok(Self {
@@ -68,12 +72,8 @@ impl FrameWriter {
 
     /// The header as at the beginning of a recording, also before the first frame: a stream of no rows is this header.
     pub fn header_at_once(&self) -> Vec<u8> {
-        self.header().unwrap_or_else(|| {
-            let ranges = vec![0.0; self.schema.columns.len()];
-            Header::new(self.schema.clone(), &[], ranges)
-                .with_form(Form::Stream)
-                .to_bytes()
-        })
+        let of_no_rows = || of_no_rows(&self.schema).with_form(Form::Stream).to_bytes();
+        self.header().unwrap_or_else(of_no_rows)
     }
 
     fn sent_header(&self) -> Option<&Header> {
@@ -93,18 +93,14 @@ impl FrameWriter {
         let bytes = header.to_bytes();
         let pieces = bytes.chunks(self.max_bytes - PIECE_OVERHEAD);
         let last = (pieces.len() - 1) as u8;
-        let frame = |(i, bytes): (usize, &[u8])| {
-            let number = i as u8;
-            Piece {
-                check: header.check,
-                last,
-                number,
-                frames,
-                bytes,
-            }
-            .to_frame()
+        let piece = |(number, bytes)| Piece {
+            check: header.check,
+            last,
+            number,
+            frames,
+            bytes,
         };
-        pieces.enumerate().map(frame).collect()
+        (0..).zip(pieces).map(piece).map(Piece::to_frame).collect()
     }
 
     /// Adds one row. Returns the frames that became full. A row that does not fit waits for the next frame.
@@ -186,12 +182,8 @@ impl FrameWriter {
     fn encode(&mut self, rows: usize) -> Result<Vec<u8>, Error> {
         // The first frame: the header's starts follow from all waiting rows.
         if self.frames == 0 {
-            self.header = Some(
-                self.rows
-                    .header(&self.schema)
-                    .with_starts(&self.rows.columns)
-                    .with_form(Form::Stream),
-            );
+            let header = self.rows.header(&self.schema).with_starts(&self.rows.columns);
+            self.header = Some(header.with_form(Form::Stream));
         }
         let header = self.header.as_ref().ok_or(Error::Broken)?;
         let rows = self.rows.first(rows, header, self.frames, Effort::Thorough);
