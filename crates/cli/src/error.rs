@@ -296,6 +296,7 @@ fn option(argument: &'static str) -> &'static str {
         "send" => "--send",
         "silent_within" => "--silent-within",
         "slope" => "--slope",
+        "odometry" => "--odometry",
         "start" => "`start` in the file of rooms",
         other => other,
     }

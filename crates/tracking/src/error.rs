@@ -48,6 +48,18 @@ pub enum Error {
         /// What is wrong, and what would mend it.
         problem: String,
     },
+    /// A sensor of the rows is none of those that were stated.
+    #[error("`{name}` is not known")]
+    Unknown {
+        /// Its name.
+        name: String,
+    },
+    /// The rooms of a leak are not as they should be.
+    #[error("{problem}")]
+    Rooms {
+        /// What is wrong.
+        problem: String,
+    },
     /// The options, or the rows, do not give a valid model.
     #[error("{what}")]
     Refused {

@@ -22,16 +22,6 @@ const NAMES: [&str; 9] = [
     "anchor", "name", "id", "node", "beacon", "sensor", "station", "tag", "label",
 ];
 
-/// What to say of two anchors at one place.
-pub(super) fn together(anchors: &[Anchor]) -> Option<String> {
-    let (i, (name, place)) = anchors
-        .iter()
-        .enumerate()
-        .find(|(i, (_, place))| anchors[..*i].iter().any(|(_, other)| other == place))?;
-    let (other, _) = anchors[..i].iter().find(|(_, other)| other == place)?;
-    Some(format!("anchors {other} and {name} stand at one place: is one of the two lines a copy?"))
-}
-
 /// The first word of a name, in small letters: `x` of `X [m]`.
 fn word(name: &str) -> String {
     let name = name.trim().to_lowercase();

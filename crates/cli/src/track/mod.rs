@@ -2,60 +2,32 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `rows`, `columns`, `own_columns` | the table as instants, which of its columns are no sensors |
-//! | `sensors` | reports as options and tables have them |
-//! | `centre`, `estimator`, `remote` | the centre of a level, its half of a sensor |
-//! | `meaning` | what the cells of a sensor mean |
-//! | `settings` | what options and first rows say |
-//! | `first` | values of the first rows |
-//! | `found` | what is found from the first rows |
-//! | `later` | the same again while rows come |
-//! | `hints` | what the first rows suggest that no option says |
-//! | `doubts` | what the values say against the stated noise |
-//! | `followed` | noise that changes while rows come |
-//! | `lasting` | errors that last from row to row |
-//! | `groups`, `lags` | groups of sensors of different levels, sensors that come late |
-//! | `transform` | roots and logarithms of values |
-//! | `stuck`, `held`, `constant`, `derived` | sensors that repeat one value, columns that hold values, never vary, or are computed from others |
-//! | `limits`, `marks`, `units` | detection limits, numbers that stand for gaps, changes of the unit |
-//! | `late` | rows that come late |
-//! | `rhythm` | silence in a table of single reports |
+//! | `rows`, `columns`, `own_columns`, `seconds` | the table as a source of rows, which of its columns are no sensors, its times |
 //! | `report` | first cell of a row, summary |
-//! | `applied` | what `fit` found, as settings |
-//! | `fit` | the task `fit`: calibration |
-//! | `level`, `picture` | the task `track`: a level, and its picture |
-//! | `ranges` | the task `ranges`: a place |
-//! | `anchors`, `odometry`, `path` | the table of its anchors, the columns of what the target moved, the picture |
-//! | `leak`, `leak_rooms` | the task `leak`: a room, and the file of rooms |
-//! | `range_summary` | what it says of a track |
-//! | `range_settings` | its options as settings, the law of signal strengths |
-//! | `targets` | several targets in one table |
-//! | `accuracies` | accuracies that its rows state |
-//! | `told` | what its first ranges tell: height, and errors that grow |
+//! | `level`, `level_options`, `picture` | the task `track`: a sheet of a level, its options, its picture |
+//! | `range_rows`, `range_options`, `path` | the task `ranges`: a sheet of places, its options, its picture |
+//! | `anchors`, `target`, `targets` | the table of anchors, several targets in one table |
+//! | `leak` | the task `leak`: a room, and the file of rooms |
+//! | `calibration` | the task `fit`: calibration, and its file |
+//!
+//! What is estimated, and what is told of it, is `fewbits_tracking`.
 
-mod accuracies;
 mod anchors;
 pub(crate) mod calibration;
 mod columns;
-mod divisor;
 mod leak;
-mod leak_rooms;
 mod level;
 mod level_options;
-mod mistakes;
-mod odometry;
 mod own_columns;
 mod path;
 mod picture;
-mod range_settings;
-mod range_summary;
-mod ranges;
+mod range_options;
+mod range_rows;
 mod report;
 mod rows;
 mod seconds;
 mod target;
 mod targets;
-mod told;
 
 use crate::Ending;
 use crate::arguments::{FitOptions, LeakOptions, RangesOptions};
@@ -70,7 +42,7 @@ use target::Target;
 /// Runs the task.
 pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {
     match (options.model, &options.anchors) {
-        (Some(Model::Ranges), Some(anchors)) => ranges(&range_settings::options(options, anchors)?),
+        (Some(Model::Ranges), Some(anchors)) => ranges(&range_options::options(options, anchors)?),
         (_, Some(_)) => Err(Error::Needed {
             option: "--model ranges",
             reason: "--anchors says where ranges are measured from",
@@ -133,7 +105,7 @@ pub(crate) fn ranges(options: &RangesOptions) -> Result<Ending, Error> {
         let instants = rows::open(table, &kind, of.as_ref().map(|target| target.rows.clone()))?;
         let mut options = options.clone();
         options.table.by.clone_from(&instants.source().roles.by);
-        ranges::run(&options, &anchors, instants, of.as_ref(), output)
+        range_rows::run(&options, &anchors, instants, of.as_ref(), output)
     };
     let mut output = None;
     let Some(column) = &options.target else {

@@ -163,7 +163,7 @@ impl<R: Rows> Instants<R> {
     }
 
     /// What was left out of rows, or is strange in them, a line each.
-    pub fn told(&self) -> Vec<String> {
+    pub(crate) fn told(&self) -> Vec<String> {
         let mut lines: Vec<String> = self.held.iter().flat_map(|held| held.hints(self.names())).collect();
         lines.extend(self.source.told());
         lines
@@ -205,7 +205,7 @@ impl<R: Rows> Instants<R> {
     }
 
     /// The same of repetitions alone, from so many first rows.
-    pub fn leave_out_old(&mut self, count: usize) -> Result<Vec<usize>, Error> {
+    pub(crate) fn leave_out_old(&mut self, count: usize) -> Result<Vec<usize>, Error> {
         self.peek(count)?;
         let held = Held::of_repetitions(&mut self.ahead, self.source.names().len());
         let found: Vec<usize> = held.sensors().collect();

@@ -4,7 +4,7 @@
 const NOTHING: f64 = 1e-6;
 
 /// The largest number of which both are multiples (Euclid). Zero is a multiple of every number, and a divisor `a` that is negligible beside `b` stays.
-pub(super) fn common_divisor(a: f64, b: f64) -> f64 {
+pub(crate) fn common_divisor(a: f64, b: f64) -> f64 {
     let least = NOTHING * a.max(b);
     if a > 0.0 && a < least {
         return a;

@@ -1,13 +1,12 @@
-//! The file of rooms of the task `leak`.
+//! Rooms in which a substance escapes, and the sensors in them.
 
 use crate::error::Error;
+use crate::rows::instant::Qualifier;
 use fewbits_diffusion::{
     Flow, FluxRule, LeakBelief, LeakPrior, Plan, PotentialFlow, Reading, SensorField, StepControl, Transport,
 };
 use fewbits_table::Side;
-use fewbits_tracking::Qualifier;
 use serde::Deserialize;
-use std::path::Path;
 
 /// Ages of a response: so many between the longest and this share of it, each larger than the one before by the same factor.
 const AGES: usize = 20;
@@ -17,39 +16,57 @@ const MOST_CELLS: usize = 200_000;
 /// A sensor of values counts as so many of words: what its values share is kept for each hypothesis.
 const OF_VALUES: usize = 4;
 
-/// Content of `rooms.toml`.
-#[derive(Deserialize)]
+/// Rooms, air, sensors and what is known of a leak. Its stored form is the file of rooms of `fewbits leak`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Rooms {
-    pub(super) plan: String,
-    square: f64,
+pub struct Rooms {
+    /// The plan, drawn with letters: [`Plan`].
+    pub plan: String,
+    /// Side of a square of the plan in metres.
+    pub square: f64,
+    /// Number of cells along a side of a square.
     #[serde(default = "two")]
-    split: usize,
-    height: f64,
-    diffusivity: f64,
+    pub split: usize,
+    /// Height of the rooms in metres.
+    pub height: f64,
+    /// Of the substance, with the turbulence of the air, in m^2/s.
+    pub diffusivity: f64,
+    /// Air through the rooms in m^3/s.
     #[serde(default)]
-    flow: f64,
+    pub flow: f64,
+    /// Of the substance, per second.
     #[serde(default)]
-    decay: f64,
+    pub decay: f64,
+    /// Concentration without a leak.
     #[serde(default)]
-    background: f64,
-    rate: [f64; 2],
-    start: Option<[f64; 2]>,
+    pub background: f64,
+    /// Smallest and largest rate of the leak.
+    pub rate: [f64; 2],
+    /// Seconds after the first row between which it began. Default: as long before the first row as the readings last, to the last row.
+    pub start: Option<[f64; 2]>,
+    /// Standard deviation of the responses' error, as a share of them.
     #[serde(default = "tenth")]
-    model_error: f64,
+    pub model_error: f64,
+    /// Probability that a reading says nothing.
     #[serde(default = "thousandth")]
-    faults: f64,
-    sensor: Vec<Sensor>,
+    pub faults: f64,
+    /// The sensors.
+    pub sensor: Vec<RoomSensor>,
 }
 
-#[derive(Deserialize)]
+/// A sensor in the rooms.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Sensor {
-    name: String,
-    place: [f64; 2],
-    noise: f64,
+pub struct RoomSensor {
+    /// Its name.
+    pub name: String,
+    /// Where it stands, in metres from the plan's first corner.
+    pub place: [f64; 2],
+    /// Standard deviation of its noise.
+    pub noise: f64,
+    /// Concentrations between which it reports words; none if it reports values.
     #[serde(default)]
-    thresholds: Vec<f64>,
+    pub thresholds: Vec<f64>,
 }
 
 fn two() -> usize {
@@ -65,29 +82,34 @@ fn thousandth() -> f64 {
 }
 
 impl Rooms {
-    pub(super) fn read(path: &Path) -> Result<Self, Error> {
-        let file = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(Error::io(&file, "read"))?;
-        let rooms: Self = toml::from_str(&text).map_err(|fault| Error::content(&file, fault))?;
+    /// The plan, if it and all numbers are as they should be.
+    ///
+    /// # Errors
+    /// If the plan is none, two sensors have one name, or a number is out of its range.
+    pub fn check(&self) -> Result<Plan, Error> {
+        let rooms = self;
+        let wrong = |problem: &dyn std::fmt::Display| Error::Rooms {
+            problem: problem.to_string(),
+        };
         let names: Vec<&str> = rooms.names().collect();
         if let Some(name) = names
             .iter()
             .find(|name| names.iter().filter(|other| other == name).count() > 1)
         {
-            return Err(Error::content(&file, format_args!("two sensors `{name}`: each needs a name of its own")));
+            return Err(wrong(&format_args!("two sensors `{name}`: each needs a name of its own")));
         }
         let positive = [("square", rooms.square), ("height", rooms.height)];
         if let Some((name, value)) = positive.iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
-            return Err(Error::content(&file, format_args!("{name} = {value}: metres above 0 are expected")));
+            return Err(wrong(&format_args!("{name} = {value}: metres above 0 are expected")));
         }
         if !(rooms.flow >= 0.0 && rooms.background.is_finite()) {
             let problem = format!(
                 "flow = {}, background = {}: m^3/s of 0 or more and a finite concentration are expected",
                 rooms.flow, rooms.background
             );
-            return Err(Error::content(&file, problem));
+            return Err(wrong(&problem));
         }
-        for Sensor {
+        for RoomSensor {
             name,
             noise,
             thresholds,
@@ -96,36 +118,39 @@ impl Rooms {
         {
             if !(*noise > 0.0 && noise.is_finite()) {
                 let problem = format_args!("noise = {noise} of `{name}`: a deviation above 0 is expected");
-                return Err(Error::content(&file, problem));
+                return Err(wrong(&problem));
             }
             let is_rising = thresholds.windows(2).all(|pair| pair[0] < pair[1]);
             if !(is_rising && thresholds.iter().all(|edge| edge.is_finite())) {
                 let problem = format_args!("thresholds = {thresholds:?} of `{name}`: increasing numbers are expected");
-                return Err(Error::content(&file, problem));
+                return Err(wrong(&problem));
             }
         }
-        Ok(rooms)
+        Plan::parse(&self.plan).map_err(|fault| wrong(&fault))
     }
 
     /// Names of the sensors.
-    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
         self.sensor.iter().map(|sensor| sensor.name.as_str())
     }
 
     /// Whether reports of a sensor are values.
-    pub(super) fn sends_values(&self, sensor: usize) -> bool {
+    pub(crate) fn sends_values(&self, sensor: usize) -> bool {
         self.sensor[sensor].thresholds.is_empty()
     }
 
     /// The belief before readings whose times end at `last`, seconds after the first, and the area of each cell.
-    pub(super) fn belief(&self, plan: &Plan, last: f64) -> Result<(LeakBelief, Transport), Error> {
-        let refused = Error::refused("the rooms are refused");
+    pub(crate) fn belief(&self, plan: &Plan, last: f64) -> Result<(LeakBelief, Transport), Error> {
+        let refused = |source: fewbits_diffusion::Error| Error::Refused {
+            what: "the rooms are refused",
+            source: source.into(),
+        };
         let start = match self.start {
             Some(start) => start,
             None if last > 0.0 => [-last, last],
             None => {
                 return Err(Error::Needed {
-                    option: "`start` in the file of rooms",
+                    argument: "start",
                     reason: "the readings have one time only, which does not say when the leak may have begun",
                 });
             }
@@ -133,10 +158,10 @@ impl Rooms {
         if !start[0].is_finite() || start[0] >= last {
             let problem =
                 format!("start = {start:?}: the first is expected before the last reading, {last} s after the first");
-            return Err(Error::content("--rooms", problem));
+            return Err(Error::Rooms { problem });
         }
-        let domain = plan.domain(self.square, self.split, 0.0).map_err(&refused)?;
-        let count = |sensor: &Sensor| if sensor.thresholds.is_empty() { OF_VALUES } else { 1 };
+        let domain = plan.domain(self.square, self.split, 0.0).map_err(refused)?;
+        let count = |sensor: &RoomSensor| if sensor.thresholds.is_empty() { OF_VALUES } else { 1 };
         let sensors: usize = self.sensor.iter().map(count).sum();
         if domain.free().len().saturating_mul(sensors) > MOST_CELLS {
             let problem = format!(
@@ -145,14 +170,14 @@ impl Rooms {
                 domain.free().len(),
                 self.sensor.len()
             );
-            return Err(Error::content("--rooms", problem));
+            return Err(Error::Rooms { problem });
         }
         let wind = match self.flow {
             0.0 => Flow::still(&domain),
-            flow => PotentialFlow::new(&domain, flow / self.height).map_err(&refused)?.flow,
+            flow => PotentialFlow::new(&domain, flow / self.height).map_err(refused)?.flow,
         };
         let transport =
-            Transport::new(domain, self.diffusivity, &wind, self.decay, FluxRule::default()).map_err(&refused)?;
+            Transport::new(domain, self.diffusivity, &wind, self.decay, FluxRule::default()).map_err(refused)?;
         let points: Vec<[f64; 3]> = self
             .sensor
             .iter()
@@ -162,20 +187,20 @@ impl Rooms {
         let age = |i: usize| longest * SHORTEST.powf(1.0 - (i + 1) as f64 / AGES as f64);
         let ages: Vec<f64> = (0..AGES).map(age).collect();
         let field =
-            SensorField::transient(&transport, &points, &ages, StepControl::Tolerance(1e-3)).map_err(&refused)?;
+            SensorField::transient(&transport, &points, &ages, StepControl::Tolerance(1e-3)).map_err(refused)?;
         let prior = LeakPrior {
             start,
             rate: self.rate,
             model_error: self.model_error,
             faults: self.faults,
         };
-        Ok((LeakBelief::new(field, &prior).map_err(&refused)?, transport))
+        Ok((LeakBelief::new(field, &prior).map_err(refused)?, transport))
     }
 
     /// What a cell of the table says, and the deviation of its noise. The responses of a plane are amounts per area: a concentration times the
     /// height.
-    pub(super) fn reading(&self, sensor: usize, cell: f64, qualifier: Qualifier) -> Result<(Reading, f64), String> {
-        let Sensor {
+    pub(crate) fn reading(&self, sensor: usize, cell: f64, qualifier: Qualifier) -> Result<(Reading, f64), String> {
+        let RoomSensor {
             name,
             noise,
             thresholds,
@@ -205,7 +230,7 @@ impl Rooms {
     }
 
     /// The plan as it is drawn, without the names of rooms, with a `*` in some squares, given by column and line of cells.
-    pub(super) fn drawn(&self, cells: impl Iterator<Item = [usize; 3]>) -> Vec<String> {
+    pub(crate) fn drawn(&self, cells: impl Iterator<Item = [usize; 3]>) -> Vec<String> {
         let lines = self
             .plan
             .lines()

@@ -1,13 +1,10 @@
-//! What the first ranges of a file tell of `ranges` where no option says it: whether errors grow with the distance, and the height of the target.
+//! What the first ranges tell where no option says it: whether errors grow with the distance, and the height of the target.
 
-use super::anchors::Anchor;
 use super::mistakes::{grows, limit};
-use super::range_settings::Strengths;
-use super::rows::Instants;
-use crate::arguments::RangesOptions;
+use super::settings::{Anchor, RangesOptions};
 use crate::error::Error;
-use crate::files::is_regular;
-use crate::numbers::short;
+use crate::rows::{Instants, Rows};
+use crate::text::short;
 use fewbits_pf_mpa::{Height, RangeSettings, height_of, proportion_of};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -20,16 +17,13 @@ const SILENCES: f64 = 4.0;
 const EACH: f64 = 5.0;
 
 /// Time in seconds, anchor and range of the first rows, without limits.
-fn first(
+fn first<R: Rows>(
     options: &RangesOptions,
     anchors: &[Anchor],
-    instants: &mut Instants,
+    instants: &mut Instants<R>,
 ) -> Result<Vec<(f64, String, f64)>, Error> {
-    let strengths = Strengths::of(options)?;
-    let first = instants
-        .peek(FIRST_ROWS)
-        .map_err(Error::tracking(&options.table.file))?
-        .clone();
+    let strengths = options.strengths;
+    let first = instants.peek(FIRST_ROWS)?.clone();
     let names = instants.names();
     let mut ranges = Vec::new();
     for instant in &first {
@@ -91,17 +85,15 @@ fn take_slowness(
 }
 
 /// Takes into the settings what the first ranges of a file tell, and says it. What comes through a pipe is not waited for.
-pub(super) fn take_told(
+pub(crate) fn take_told<R: Rows>(
     options: &RangesOptions,
     anchors: &[Anchor],
     settings: &mut RangeSettings,
-    instants: &mut Instants,
+    instants: &mut Instants<R>,
 ) -> Result<Vec<String>, Error> {
     let mut said = Vec::new();
-    if is_regular(&options.table.file) {
-        let old = instants
-            .leave_out_old(FIRST_ROWS)
-            .map_err(Error::tracking(&options.table.file))?;
+    if options.looks_ahead {
+        let old = instants.leave_out_old(FIRST_ROWS)?;
         if !old.is_empty() {
             let names: Vec<&str> = old.iter().map(|i| instants.names()[*i].as_str()).collect();
             said.push(format!(
@@ -111,7 +103,7 @@ pub(super) fn take_told(
         }
     }
     let is_flat = anchors.iter().all(|(_, place)| place.z == 0.0);
-    if is_regular(&options.table.file) {
+    if options.looks_ahead {
         let owned = first(options, anchors, instants)?;
         let ranges: Vec<(f64, &str, f64)> = owned
             .iter()
@@ -127,7 +119,7 @@ pub(super) fn take_told(
         };
         let mut found = height(*settings);
         // A height that is not known makes errors that depend on the distance too, and rows may state theirs.
-        let grows_by = |settings| proportion(settings).filter(|_| instants.source().roles.any_accuracy().is_none());
+        let grows_by = |settings| proportion(settings).filter(|_| !options.has_accuracies);
         if let Some((noise, proportional)) = grows_by(at(*settings, found)) {
             said.push(grows(noise, "taken, as"));
             *settings = RangeSettings {
@@ -152,7 +144,7 @@ pub(super) fn take_told(
     }
     if !is_flat && settings.height == Height::Unsaid {
         return Err(Error::Needed {
-            option: "--height",
+            argument: "height",
             reason: "the anchors have heights, and the first ranges do not tell that of the target",
         });
     }

@@ -1,17 +1,17 @@
 //! Mistakes of tables that `ranges` tells.
 
-use crate::numbers::short;
+use crate::text::short;
 use fewbits_pf_mpa::{Mistake, RangeSettings, mistake_of, proportion_of};
 use nalgebra::Vector3;
 
 /// Ranges from which a mistake is found.
-pub(super) const FIRST_RANGES: usize = 400;
+pub(crate) const FIRST_RANGES: usize = 400;
 
 /// A range is a limit if one in so many of at least that many is it.
 const REPEATED: usize = 20;
 
 /// The largest of some ranges, with their anchors, if it stands there so often, and for two anchors, that it is a limit and no distance.
-pub(super) fn limit<A: PartialEq + Copy>(ranges: impl Iterator<Item = (A, f64)> + Clone) -> Option<f64> {
+pub(crate) fn limit<A: PartialEq + Copy>(ranges: impl Iterator<Item = (A, f64)> + Clone) -> Option<f64> {
     let largest = ranges
         .clone()
         .fold(f64::NEG_INFINITY, |largest, (_, range)| largest.max(range));
@@ -25,7 +25,7 @@ pub(super) fn limit<A: PartialEq + Copy>(ranges: impl Iterator<Item = (A, f64)> 
 }
 
 /// What to do about ranges that are limits.
-pub(super) fn limited(first: &[(f64, usize, f64)]) -> Option<String> {
+pub(crate) fn limited(first: &[(f64, usize, f64)]) -> Option<String> {
     let limit = short(limit(first.iter().map(|(_, anchor, range)| (*anchor, *range)))?);
     Some(format!(
         "many ranges are {limit}, and none is longer: if the radio says no more, they are limits, and --missing {limit} leaves them out"
@@ -40,7 +40,7 @@ fn named<'a>(anchors: &'a [(String, Vector3<f64>)], first: &[(f64, usize, f64)])
 }
 
 /// What to do about errors that grow with the distance.
-pub(super) fn proportion(
+pub(crate) fn proportion(
     anchors: &[(String, Vector3<f64>)],
     settings: RangeSettings,
     first: &[(f64, usize, f64)],
@@ -50,7 +50,7 @@ pub(super) fn proportion(
 }
 
 /// The mistake that explains the first ranges, if there is one.
-pub(super) fn mistake(
+pub(crate) fn mistake(
     anchors: &[(String, Vector3<f64>)],
     settings: RangeSettings,
     first: &[(f64, usize, f64)],
@@ -59,7 +59,7 @@ pub(super) fn mistake(
 }
 
 /// What to do about a mistake.
-pub(super) fn mended(mistake: &Mistake) -> Option<String> {
+pub(crate) fn mended(mistake: &Mistake) -> Option<String> {
     let what = match mistake {
         Mistake::Height(height) => {
             let height = short(*height);
@@ -99,7 +99,7 @@ pub(super) fn mended(mistake: &Mistake) -> Option<String> {
 }
 
 /// What is said of errors that grow with the distance.
-pub(super) fn grows(noise: f64, taken: &str) -> String {
+pub(crate) fn grows(noise: f64, taken: &str) -> String {
     let (noise, largest) = (short(100.0 * noise), (200.0 * noise).ceil());
     format!(
         "errors grow with the distance, {noise} % of it: {taken} --noise {largest}% says; a --noise without % leaves it out, and --rssi takes strengths in dBm"

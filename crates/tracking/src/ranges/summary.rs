@@ -1,55 +1,106 @@
-//! The summary of `ranges`.
+//! What is said of a track by ranges.
 
-use crate::numbers::short;
+use super::settings::Anchor;
+use crate::text::short;
 use fewbits_pf_mpa::{Mistake, RangeSettings, RangeTracker};
 use serde::Serialize;
 
 /// A track that is lost, or doubtful, once in so many rows is so often.
-pub(super) const OFTEN: u64 = 20;
+pub(crate) const OFTEN: u64 = 20;
 
-#[derive(Serialize)]
-pub(super) struct Summary {
+/// What was found over all rows of ranges.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct RangesSummary {
+    /// The target's name, if there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) target: Option<String>,
-    pub(super) rows: u64,
-    pub(super) ranges: usize,
-    pub(super) bits: usize,
-    pub(super) bits_per_range: f64,
+    pub target: Option<String>,
+    /// Number of rows.
+    pub rows: u64,
+    /// Number of ranges.
+    pub ranges: usize,
+    /// Number of bits that were sent.
+    pub bits: usize,
+    /// Mean number of bits of a range.
+    pub bits_per_range: f64,
     /// Number of rows without an estimate, during acquisition of the position.
-    pub(super) searching: u64,
+    pub searching: u64,
     /// Number of rows in which several places explain the ranges.
-    pub(super) ambiguous: u64,
+    pub ambiguous: u64,
     /// Number of rows in which bias and scale contradict what is supposed of them.
-    pub(super) doubtful: u64,
+    pub doubtful: u64,
     /// Number of ranges that were left out because they are negative.
-    pub(super) negative: u64,
+    pub negative: u64,
     /// Number of ranges that were left out because they are zero.
-    pub(super) zero: u64,
-    pub(super) losses: usize,
-    pub(super) anchors: Vec<AnchorSummary>,
-    /// What the ranges suggest that no option says.
-    pub(super) hints: Vec<String>,
+    pub zero: u64,
+    /// How often the track was lost.
+    pub losses: usize,
+    /// The anchors.
+    pub anchors: Vec<AnchorSummary>,
+    /// What the ranges suggest that no option says, a sentence each, as [`LevelSummary::hints`](crate::LevelSummary::hints).
+    pub hints: Vec<String>,
     /// The mistake of the tables that explains the ranges.
     #[serde(skip)]
-    pub(super) mistake: Option<Mistake>,
+    pub mistake: Option<Mistake>,
+    /// The summary as sentences.
+    #[serde(skip)]
+    pub lines: Vec<String>,
 }
 
-#[derive(Serialize)]
-pub(super) struct AnchorSummary {
-    pub(super) name: String,
-    pub(super) ranges: usize,
+/// An anchor over all rows.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct AnchorSummary {
+    /// Its name.
+    pub name: String,
+    /// Number of its ranges.
+    pub ranges: usize,
     /// Probability at the end that its ranges depend on the distance.
-    pub(super) works: f64,
+    pub works: f64,
     /// Mean product of its successive residuals in their deviations, if it is far above zero: its place, or the law of its ranges, is wrong.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) lasting: Option<f64>,
+    pub lasting: Option<f64>,
     /// The bias that it has alone.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) own_bias: Option<f64>,
+    pub own_bias: Option<f64>,
+}
+
+impl RangesSummary {
+    pub(crate) fn new(anchors: &[Anchor]) -> Self {
+        let anchor = |(name, _): &Anchor| AnchorSummary {
+            name: name.clone(),
+            ranges: 0,
+            works: 1.0,
+            own_bias: None,
+            lasting: None,
+        };
+        Self {
+            target: None,
+            rows: 0,
+            ranges: 0,
+            bits: 0,
+            bits_per_range: 0.0,
+            searching: 0,
+            ambiguous: 0,
+            doubtful: 0,
+            negative: 0,
+            zero: 0,
+            losses: 0,
+            anchors: anchors.iter().map(anchor).collect(),
+            hints: Vec::new(),
+            mistake: None,
+            lines: Vec::new(),
+        }
+    }
 }
 
 /// What is said of a track, a line each. `least`: the probability below which an anchor contradicts the others.
-pub(super) fn lines(summary: &Summary, tracker: &RangeTracker, settings: RangeSettings, least: f64) -> Vec<String> {
+pub(crate) fn lines(
+    summary: &RangesSummary,
+    tracker: &RangeTracker,
+    settings: RangeSettings,
+    least: f64,
+) -> Vec<String> {
     let silence = settings.silence;
     let mut lines = vec![
         format!("{} rows, {} ranges of {:.2} bits on average", summary.rows, summary.ranges, summary.bits_per_range),
