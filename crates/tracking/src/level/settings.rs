@@ -109,7 +109,7 @@ impl Settings {
         } else {
             Vec::new()
         };
-        let first: Vec<Instant> = instants.peek(rows)?.iter().cloned().collect();
+        let first: Vec<Instant> = instants.peek(rows)?.iter().take(rows).cloned().collect();
         if first.is_empty() {
             return Err(Error::Empty);
         }
