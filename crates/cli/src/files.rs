@@ -7,7 +7,7 @@ use crate::arguments::{ReceiveOptions, TableOptions, Task};
 use crate::design_options::Form;
 use crate::error::Error;
 use crate::naming::{self, Written};
-use crate::{many, target};
+use crate::{patterns, target};
 use fewbits_recipes::names;
 use std::fs::{File, Metadata};
 use std::path::{Path, PathBuf};
@@ -314,10 +314,10 @@ pub(crate) fn prepare(task: &mut Task) -> Result<(), Error> {
     } {
         // The given order decides which of two recordings has its columns' order; wildcards are sorted.
         let names: Vec<&str> = files.iter().map(String::as_str).collect();
-        *files = many::expanded_in_order(&names)?;
+        *files = patterns::expanded_in_order(&names)?;
     }
     // Several files are compared when their names are known.
-    if many::are_several(task) {
+    if patterns::are_several(task) {
         return Ok(());
     }
     let files = Files::of(task);

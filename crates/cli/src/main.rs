@@ -10,6 +10,7 @@ mod centre;
 mod clock;
 mod design;
 mod design_options;
+mod ending;
 mod error;
 mod files;
 mod fit_options;
@@ -34,6 +35,7 @@ mod output;
 mod pack;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod patterns;
 mod place;
 mod plan;
 mod plot;
@@ -48,6 +50,7 @@ mod say;
 mod send;
 mod sensor;
 mod serial;
+mod shard;
 mod single_pass;
 mod stretches;
 mod table_options;
@@ -61,40 +64,16 @@ mod waiting;
 
 use arguments::{Cli, Task};
 use clap::Parser;
+pub(crate) use ending::Ending;
 use error::Error;
 use say::say;
 use std::error::Error as _;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-/// The end of a task that was not refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Ending {
-    Good,
-    /// An error bound is violated, or a part could not be read.
-    Failed,
-    /// Some of several files were refused, and each was named.
-    Refused,
-}
-
-impl Ending {
-    /// The end of a task that received no complete frame.
-    pub(crate) fn no_frame(name: &str) -> Self {
-        say!("error: {name}: no whole frame came: use the sender's link, options and baud rate, and wait longer");
-        Self::Failed
-    }
-
-    /// The end of a task that received no reading in messages of other programs.
-    pub(crate) fn no_reading(name: &str, device: Option<&str>) -> Self {
-        let of = device.map_or_else(String::new, |device| format!(" of device `{device}`"));
-        say!("error: {name}: no reading came: no message{of} had one in a form of `--format`");
-        Self::Failed
-    }
-}
-
 fn run(mut task: Task) -> Result<Ending, Error> {
     files::prepare(&mut task)?;
-    let are_several = many::are_several(&task);
+    let are_several = patterns::are_several(&task);
     match task {
         Task::Pack(options) if are_several => many::pack(&options),
         Task::Track(options) if are_several => many::track(&options),

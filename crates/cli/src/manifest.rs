@@ -5,7 +5,7 @@
 //! the list is written anew, sorted by name.
 
 use crate::error::Error;
-use crate::many::Shard;
+use crate::shard::Shard;
 use crate::target::Target;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

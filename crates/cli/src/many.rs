@@ -5,100 +5,24 @@
 //! every third file, so that machines share the work.
 
 use crate::Ending;
-use crate::arguments::{ManyOptions, PackOptions, RangesOptions, Task, TrackOptions, VerifyOptions};
+use crate::arguments::{ManyOptions, PackOptions, RangesOptions, TrackOptions, VerifyOptions};
 use crate::error::Error;
 use crate::files::{identity, is_regular};
 use crate::manifest::Manifest;
+use crate::patterns::expanded_in_order;
 use crate::say::{collect, say};
+use crate::shard::Shard;
 use std::collections::HashMap;
 use std::error::Error as _;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
-
-/// One of several equal shares.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Shard {
-    index: usize,
-    pub(crate) count: usize,
-}
-
-impl Shard {
-    /// The number of the share, from 1.
-    pub(crate) fn number(self) -> usize {
-        self.index + 1
-    }
-}
-
-impl FromStr for Shard {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (number, count) = text.split_once('/').ok_or("expected I/N, as 2/3")?;
-        let parse = |text: &str| {
-            text.trim()
-                .parse::<usize>()
-                .map_err(|_| format!("`{text}`: expected a whole number"))
-        };
-        let (number, count) = (parse(number)?, parse(count)?);
-        if number == 0 || number > count {
-            return Err(format!("share {number} of {count}: expected 1 to {count}"));
-        }
-        Ok(Self {
-            index: number - 1,
-            count,
-        })
-    }
-}
 
 /// A file of several, and where its result goes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Job {
     file: String,
     output: PathBuf,
-}
-
-fn is_pattern(file: &str) -> bool {
-    file.contains(['*', '?', '[']) && !Path::new(file).exists()
-}
-
-/// Whether the task is one of several files.
-pub(crate) fn are_several(task: &Task) -> bool {
-    let of = |file: &str, many: &ManyOptions, folder: Option<&PathBuf>| {
-        !many.more.is_empty() || many.shard.is_some() || is_pattern(file) || folder.is_some_and(|path| path.is_dir())
-    };
-    match task {
-        Task::Pack(options) => of(&options.table.file, &options.many, options.output.as_ref()),
-        Task::Track(options) => of(&options.table.file, &options.many, options.output.as_ref()),
-        Task::Ranges(options) => of(&options.table.file, &options.many, options.output.as_ref()),
-        Task::Verify(options) => of(&options.table.file, &options.many, Some(&options.packed)),
-        _ => false,
-    }
-}
-
-/// The names of all files, each once, in the given order; those of a wildcard are sorted.
-pub(crate) fn expanded_in_order(names: &[&str]) -> Result<Vec<String>, Error> {
-    let mut files: Vec<String> = Vec::new();
-    for name in names {
-        let mut found = match is_pattern(name) {
-            // What cannot be read is named when its turn comes.
-            true => glob::glob(name)
-                .map_err(|error| Error::content(name, error))?
-                .map(|path| path.unwrap_or_else(|error| error.path().to_owned()))
-                .filter(|path| !path.is_dir())
-                .map(|path| path.to_string_lossy().into_owned())
-                .collect(),
-            false => vec![(*name).to_owned()],
-        };
-        if found.is_empty() {
-            return Err(Error::content(name, "no file has a name like this"));
-        }
-        found.sort();
-        found.retain(|file| !files.contains(file));
-        files.extend(found);
-    }
-    Ok(files)
 }
 
 /// The names of all files, sorted, so that several machines agree on them.

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::identity::Identity;
-use crate::many::Shard;
+use crate::shard::Shard;
 use clap::Args;
 use std::path::PathBuf;
 

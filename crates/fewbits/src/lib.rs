@@ -1,7 +1,7 @@
 //! Estimation from sensors that may send only a few bits: one bit per sample, a message only when it matters.
 //!
 //! This crate only re-exports; depend on the single crates if you need one of them. Each is behind a feature of its name,
-//! all but `diffusion` (which builds a sparse solver), `link-mqtt` and `link-zenoh` on by default:
+//! all but `diffusion` and `tracking` (which build a sparse solver), `link-mqtt` and `link-zenoh` on by default:
 //!
 //! | module | feature | what it is for |
 //! |---|---|---|
@@ -21,6 +21,7 @@
 //! | `sensor_assignment` | `sensor-assignment` | which sensor sends which bit |
 //! | `block_codec`, `record` | `record` | blocks of samples in few bits; files and frames of many columns within guaranteed errors |
 //! | `table` | `table` | tables of strangers: dialects, times, gaps and kinds of columns |
+//! | `tracking` | `tracking` | estimates from tables: a level, a place from ranges, a leak, the calibration of sensors |
 //! | `recipes` | `recipes` | what a person does with a table: bounds, plan, pack, verify, as functions |
 //! | `link`, `protocol` | `link`; `link-mqtt`, `link-zenoh` | a fusion centre and its sensors as processes: frames, keys, sockets; over MQTT, over zenoh |
 //! | `node` | `node` | the sensor's halves of all schemes, without the standard library |
@@ -81,6 +82,8 @@ pub use fewbits_sensor_assignment as sensor_assignment;
 pub use fewbits_table as table;
 #[cfg(any(feature = "diffusive", feature = "network"))]
 pub use fewbits_topology as topology;
+#[cfg(feature = "tracking")]
+pub use fewbits_tracking as tracking;
 
 /// The programs of the README and of the pages in `docs`, kept running.
 #[cfg(doctest)]

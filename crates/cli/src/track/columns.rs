@@ -1,8 +1,6 @@
 //! Which columns of a table are no sensors.
 
-use super::level_options::silence;
-use crate::arguments::{TableOptions, TrackOptions};
-use crate::error::Error;
+use crate::arguments::TableOptions;
 use crate::input::Table;
 use fewbits_table::Kind as Cells;
 use fewbits_table::names::as_argument;
@@ -100,19 +98,6 @@ pub(super) struct Kind {
 }
 
 impl Kind {
-    pub(super) fn of(options: &TrackOptions) -> Result<Self, Error> {
-        let silent = options.silent_within.as_deref().map(silence).transpose()?;
-        Ok(Self {
-            finds: if options.reports { Finds::Labels } else { Finds::Levels },
-            sampled: silent.and_then(|(_, seconds)| seconds),
-            by: options.table.by.clone(),
-            accuracy: options.accuracy_column.clone(),
-            threshold: options.threshold_column.clone(),
-            is_filled: options.silent_within.is_some(),
-            late: options.late.map_or(0.0, |late| late.as_secs_f64()),
-        })
-    }
-
     pub(super) fn columns(&self) -> impl Iterator<Item = &String> {
         self.accuracy.iter().chain(&self.threshold)
     }

@@ -1,5 +1,6 @@
 //! The options of `track` as those of the library, and their language.
 
+use super::columns::{Finds, Kind};
 use super::rows::Instants;
 use crate::bounds::PerColumn;
 use crate::error::Error;
@@ -12,6 +13,20 @@ const MAX_BITS: u32 = 4;
 
 /// Lower and upper limit.
 pub(super) type Ends = (Option<f64>, Option<f64>);
+
+/// Which columns are no sensors, as the options say.
+pub(super) fn kind(options: &TrackOptions) -> Result<Kind, Error> {
+    let silent = options.silent_within.as_deref().map(silence).transpose()?;
+    Ok(Kind {
+        finds: if options.reports { Finds::Labels } else { Finds::Levels },
+        sampled: silent.and_then(|(_, seconds)| seconds),
+        by: options.table.by.clone(),
+        accuracy: options.accuracy_column.clone(),
+        threshold: options.threshold_column.clone(),
+        is_filled: options.silent_within.is_some(),
+        late: options.late.map_or(0.0, |late| late.as_secs_f64()),
+    })
+}
 
 /// The options as the library has them.
 pub(super) fn level_options(options: &TrackOptions, instants: &Instants) -> Result<LevelOptions, Error> {

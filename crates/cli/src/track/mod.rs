@@ -48,7 +48,7 @@ pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {
             reason: "--anchors says where ranges are measured from",
         }),
         _ => {
-            let instants = rows::open(&options.table, &Kind::of(options)?, None)?;
+            let instants = rows::open(&options.table, &level_options::kind(options)?, None)?;
             let mut options = options.clone();
             let roles = &instants.source().roles;
             options.table.by.clone_from(&roles.by);

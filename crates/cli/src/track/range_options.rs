@@ -33,7 +33,7 @@ pub(super) fn odometry(options: &RangesOptions, anchors: &[Anchor], instants: &I
     if options.table.by.is_some() || !matches!(names.len(), 2 | 3) {
         return Ok(());
     }
-    let is_there =
+    let is_missing =
         |name: &&String| !anchors.iter().any(|(anchor, _)| anchor == *name) && !instants.names().contains(name);
     match names.iter().find(is_missing) {
         Some(name) => {

@@ -191,9 +191,7 @@ impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
 
     /// Returns to a state of the same sensors.
     fn return_to(&mut self, mut saved: Saved<F::Belief>) {
-        if let Some(marks) = &mut self.marks {
-            marks.undo(&mut saved);
-        }
+        self.marks.iter_mut().for_each(|marks| marks.undo(&mut saved));
         (self.error, self.rng) = (saved.error, saved.rng);
         self.restore(saved.mark);
     }

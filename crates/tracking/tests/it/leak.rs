@@ -42,7 +42,11 @@ fn the_room_of_a_leak_is_that_of_the_sensor_that_smells_it() {
     rows.iter().for_each(|row| tracker.step(row).unwrap());
     let found = tracker.estimate().unwrap();
     let sum: f64 = found.rooms.iter().map(|(_, p)| p).sum();
-    assert!((sum - 1.0).abs() < 1e-9 && found.rooms[0].0 == "left" && found.rooms[0].1 > 0.9, "{:?}", found.rooms);
+    assert!(
+        (sum - 1.0).abs() < 1e-9 && found.rooms[0].0 == "left" && found.rooms[0].1 > 0.9,
+        "{:?}",
+        found.rooms
+    );
     let summary = tracker.finish(0).unwrap();
     assert_eq!((summary.rows, summary.readings), (20, 40));
 }
