@@ -4,7 +4,7 @@
 //! the column, the other cells or the digits themselves say so.
 
 use crate::column::MAX_WORDS;
-use crate::hint::without_unit;
+use crate::hint::{is_padded, without_unit};
 use crate::number::{self, Syntax};
 
 /// Words of names of columns that hold identifiers.
@@ -63,11 +63,6 @@ pub(crate) fn is_named(name: &str) -> bool {
     words.split(' ').any(|word| NAMES.contains(&word))
 }
 
-/// Whether a text is digits alone with a zero in front, as `007`.
-pub(crate) fn is_padded(text: &str) -> bool {
-    text.len() > 1 && text.starts_with('0') && text.bytes().all(|c| c.is_ascii_digit())
-}
-
 /// Whether texts are digits of binary numbers, all of one length of four or more.
 pub(crate) fn are_bits<'a>(mut texts: impl Iterator<Item = &'a String> + Clone) -> bool {
     let length = texts.clone().next().map_or(0, String::len);
@@ -114,12 +109,4 @@ pub(crate) fn have_unit<'a>(texts: impl ExactSizeIterator<Item = &'a String> + C
         && parts
             .iter()
             .all(|(number, other)| *other == unit && number::read(number.as_bytes(), syntax).is_ok())
-}
-
-/// Whether a text is a version or an address, as `1.10.2` and `10.0.0.1`: points between digits, which are no groups of three.
-pub(crate) fn is_dotted(text: &str) -> bool {
-    let mut parts = text.split('.');
-    let is_part = |part: &str| !part.is_empty() && part.bytes().all(|c| c.is_ascii_digit());
-    let is_group = |(i, part): (usize, &str)| part.len() == 3 || (i == 0 && part.len() < 3);
-    text.matches('.').count() >= 2 && parts.clone().all(is_part) && !parts.by_ref().enumerate().all(is_group)
 }

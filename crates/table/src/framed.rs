@@ -213,23 +213,27 @@ fn is_drawn(c: char) -> bool {
 pub(crate) struct Framed {
     source: Box<dyn BufRead + Send>,
     frame: Frame,
+    /// The last byte of lines.
+    end: u8,
     /// Lines of cells that are not handed out yet, from `at` on.
     lines: Vec<u8>,
     at: usize,
 }
 
 impl Framed {
-    /// A reader of bytes that were read, and of those behind them.
-    pub(crate) fn new(first: &[u8], rest: Box<dyn BufRead + Send>, frame: Frame) -> Self {
-        let whole = first.iter().rposition(|c| *c == b'\n').map_or(0, |last| last + 1);
+    /// A reader of the bytes that were read, and of those behind them.
+    pub(crate) fn new(head: &Head, rest: Box<dyn BufRead + Send>, frame: Frame) -> Self {
+        let (first, end) = (head.bytes.as_slice(), head.end);
+        let whole = first.iter().rposition(|c| *c == end).map_or(0, |last| last + 1);
         let (lines, begun) = first.split_at(whole);
         Self {
             lines: lines
-                .split_inclusive(|c| *c == b'\n')
+                .split_inclusive(|c| *c == end)
                 .flat_map(|line| plain(frame, line))
                 .collect(),
             source: Box::new(Cursor::new(begun.to_vec()).chain(rest)),
             frame,
+            end,
             at: 0,
         }
     }
@@ -254,7 +258,7 @@ impl Read for Framed {
             self.source
                 .by_ref()
                 .take(MAX_LINE as u64)
-                .read_until(b'\n', &mut line)?;
+                .read_until(self.end, &mut line)?;
             (self.lines, self.at) = (plain(self.frame, &line), 0);
         }
         let count = target.len().min(self.lines.len() - self.at);

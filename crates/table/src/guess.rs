@@ -2,6 +2,7 @@
 
 use crate::civil::{self, Zone, digits, is_compact};
 use crate::time::{Scale, Time, Unit};
+pub(crate) use crate::worded::three;
 use crate::written::{Clock, NAMED_ZONE, Order, Problem, Syntax};
 
 /// What cells leave open.
@@ -118,15 +119,6 @@ pub(crate) fn offset_in(name: &str) -> Option<String> {
         return Some("UTC".to_owned());
     }
     civil::offset(&text).map(|_| text)
-}
-
-/// The three numbers at the beginning of a date with marks between them, and whether each has two digits at most.
-pub(crate) fn three(cell: &str) -> Option<([i64; 3], bool)> {
-    let (first, first_count, rest) = digits(civil::undressed(cell), 4)?;
-    let mark = rest.chars().next().filter(|mark| matches!(mark, '/' | '-' | '.'))?;
-    let (second, second_count, rest) = digits(&rest[1..], 4)?;
-    let (third, third_count, _) = digits(rest.strip_prefix(mark)?, 4)?;
-    Some(([first, second, third], first_count.max(second_count).max(third_count) <= 2))
 }
 
 /// Whether dates of two digits each may be of one year that stands first: their first number stays, and their last changes, or all are one

@@ -1,7 +1,5 @@
 //! Texts that are no numbers as they stand: whether they are likely numbers of another spelling, and the option that would read them.
 
-use crate::codes;
-
 /// Marks without ink at the ends of cells, as programs leave them: spaces of several kinds, and the mark of an encoding.
 pub(crate) const BLANKS: [char; 7] = [
     '\u{a0}', '\u{202f}', '\u{2009}', '\u{200b}', '\u{feff}', '\u{b}', '\u{c}',
@@ -61,7 +59,7 @@ pub(crate) fn hint(text: &str) -> &'static str {
         "say --thousands \"'\""
     } else if text.bytes().all(|c| c.is_ascii_digit() || b"+-.,_".contains(&c)) && text.contains('_') {
         "say --thousands _"
-    } else if codes::is_dotted(text) {
+    } else if is_dotted(text) {
         "if it is a version or an address, say --words; or leave the column out with --without"
     } else if plain && points > 2 {
         "say --thousands and the mark between groups"
@@ -89,6 +87,19 @@ fn begins_with_zeros(text: &str) -> bool {
 
 /// Beginnings of units that are no letters: per cent, per mille, degrees, micro, inches, minutes.
 const SYMBOLS: [char; 7] = ['%', '‰', '°', 'µ', '"', '″', '′'];
+
+/// Whether a text is digits alone with a zero in front, as `007`.
+pub(crate) fn is_padded(text: &str) -> bool {
+    text.len() > 1 && text.starts_with('0') && text.bytes().all(|c| c.is_ascii_digit())
+}
+
+/// Whether a text is a version or an address, as `1.10.2` and `10.0.0.1`: points between digits, which are no groups of three.
+pub(crate) fn is_dotted(text: &str) -> bool {
+    let mut parts = text.split('.');
+    let is_part = |part: &str| !part.is_empty() && part.bytes().all(|c| c.is_ascii_digit());
+    let is_group = |(i, part): (usize, &str)| part.len() == 3 || (i == 0 && part.len() < 3);
+    text.matches('.').count() >= 2 && parts.clone().all(is_part) && !parts.by_ref().enumerate().all(is_group)
+}
 
 /// Signs that may stand before a number.
 const CURRENCIES: [char; 4] = ['$', '€', '£', '¥'];
@@ -119,7 +130,7 @@ pub(crate) fn looks_like_number(text: &str) -> bool {
     }
     // A minus behind the number, fractions and digits of other scripts too.
     let hexadecimal = size.strip_prefix("0x").or(size.strip_prefix("0X"));
-    if codes::is_dotted(size) {
+    if is_dotted(size) {
         return false;
     }
     let is_plain = size

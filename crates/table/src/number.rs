@@ -1,7 +1,6 @@
 //! Numbers as loggers write them. What a double cannot hold is refused, never rounded in silence.
 
-use crate::codes;
-use crate::hint::{BLANKS, DASHES, SPACES, hint};
+use crate::hint::{BLANKS, DASHES, SPACES, hint, is_padded};
 use std::borrow::Cow;
 
 /// How numbers are written.
@@ -201,7 +200,7 @@ fn slowly(text: &[u8], syntax: Syntax) -> Result<Number, Fault> {
 /// A text without the marks of `="0.5"`, as which spreadsheets keep texts of digits; `None` if zeros in front say that it is no number.
 fn formula(text: &str) -> Option<&str> {
     let inner = text.strip_prefix("=\"").and_then(|text| text.strip_suffix('"'));
-    inner.map_or(Some(text), |inner| Some(inner).filter(|inner| !codes::is_padded(inner)))
+    inner.map_or(Some(text), |inner| Some(inner).filter(|inner| !is_padded(inner)))
 }
 
 /// A number with an exponent as of Fortran, `1.95D+01`, with that of others.

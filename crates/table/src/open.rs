@@ -32,7 +32,7 @@ impl Table {
             if let Some(mark) = frame.delimiter() {
                 dialect.delimiter.get_or_insert(mark.to_owned());
             }
-            let framed = Framed::new(&head.bytes, reader, frame);
+            let framed = Framed::new(&head, reader, frame);
             reader = Box::new(BufReader::with_capacity(head::MAX_BYTES, framed));
             head = Head::read(&mut *reader)?;
         }
@@ -45,7 +45,8 @@ impl Table {
         }
         let first = head.bytes.iter().copied().find(|c| !c.is_ascii_whitespace());
         let is_object = first == Some(b'{') && said.delimiter.is_none();
-        if head.bytes.windows(2).any(|pair| pair == b"\x1b[") {
+        let coloured = head.filled_lines().filter(|line| line.contains("\u{1b}[")).count();
+        if 2 * coloured > head.filled_lines().count() {
             return Err(Error::Format {
                 what: "text with colours of a terminal",
                 mend: "take them out: sed 's/\\x1b\\[[0-9;]*[A-Za-z]//g' FILE | fewbits ... -",

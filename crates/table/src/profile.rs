@@ -1,13 +1,12 @@
 //! What the cells of a column are, counted over rows: its kind, its range, its gaps by spelling, and what looks wrong.
 
-use crate::codes;
 use crate::column::{Kind, MAX_WORDS};
 use crate::early::Early;
 use crate::ends::{self, End, Sentinel};
 use crate::error::Place;
 use crate::extent::{Extent, FewCells};
 use crate::guess;
-use crate::hint::{looks_like_number, without_unit};
+use crate::hint::{is_padded, looks_like_number, without_unit};
 use crate::missing::{self, Spellings};
 use crate::number::{self, Number};
 use crate::quick;
@@ -258,7 +257,7 @@ impl Profile {
         // Numbers may be words among words: `A1`, `7`, `B2`.
         if self.texts > 0 {
             self.word(cell);
-        } else if self.early.add(cell) && self.padded.is_none() && codes::is_padded(cell) {
+        } else if self.early.add(cell) && self.padded.is_none() && is_padded(cell) {
             self.padded = Some(cell.to_owned());
         }
     }

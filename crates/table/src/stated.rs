@@ -1,8 +1,8 @@
 //! What the name of a column of times states beside its unit: the order of dates, and the zero of numbers; calendars by their years.
 
 use crate::civil::{self, Order, Problem};
-use crate::guess::three;
 use crate::interval;
+use crate::worded::three;
 
 /// The order of day, month and year that a pattern in a name states, as of `Time (DD/MM/YYYY h:mm:ss A)`.
 pub(crate) fn order(names: &[&str]) -> Option<Order> {

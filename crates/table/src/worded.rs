@@ -98,3 +98,12 @@ pub(crate) fn arranged(text: &str) -> Option<String> {
     let year = words.remove(year);
     Some(format!("{year}-{month:02}-{day:0>2} {}", words.join(" ")))
 }
+
+/// The three numbers at the beginning of a date with marks between them, and whether each has two digits at most.
+pub(crate) fn three(cell: &str) -> Option<([i64; 3], bool)> {
+    let (first, first_count, rest) = digits(undressed(cell), 4)?;
+    let mark = rest.chars().next().filter(|mark| matches!(mark, '/' | '-' | '.'))?;
+    let (second, second_count, rest) = digits(&rest[1..], 4)?;
+    let (third, third_count, _) = digits(rest.strip_prefix(mark)?, 4)?;
+    Some(([first, second, third], first_count.max(second_count).max(third_count) <= 2))
+}

@@ -35,7 +35,11 @@ fn markdown_and_other_bars_are_no_columns() {
     let rule = "+------+-----+";
     is_plain(&format!("{rule}\n| time | x   |\n{rule}\n{body}{rule}\n6 rows in set (0.01 sec)\n"));
     is_plain(&format!("{rule}\n| time | x |\n+======+=====+\n{}", body.replace("5 |\n", "5 |\n+------+-----+\n")));
-    is_plain(&format!("|time|x|\n{}", body.replace(' ', "")));
+    let bare = format!("|time|x|\n{}", body.replace(' ', ""));
+    for end in ["\n", "\r\n", "\r"] {
+        is_plain(&bare.replace('\n', end));
+        is_plain(bare.replace('\n', end).trim_end());
+    }
 }
 
 #[test]
@@ -125,6 +129,13 @@ fn lines_that_hide_cells_are_refused() {
     assert!(
         not_opened(&lines("time,x\n", 5, |i| format!("{i},\u{1b}[32m{i}.5\u{1b}[0m")))
             .contains("colours of a terminal")
+    );
+    // A name that has one is a name.
+    assert_eq!(
+        open(&lines("time,\u{1b}[2Jx\n", 5, |i| format!("{i},{i}.5")))
+            .columns()
+            .len(),
+        2
     );
     for mark in [':', '#', '/'] {
         let text = lines("id,a,b\n", 5, |i| format!("{i},{i}.5,{i}")).replace(',', &mark.to_string());
