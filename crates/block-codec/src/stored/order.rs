@@ -46,9 +46,10 @@ impl Order {
             indices.extend(sums.iter().map(|sum| sum.wrapping_add(base)));
         }
         // Bits of all sizes together.
-        let found = indices[begun..].iter();
-        let bits = found.fold(0, |bits, index| bits | index ^ index >> 63);
-        ensure!(bits < 2 * LARGEST, damaged(bits));
+        let found = &indices[begun..];
+        let bits = found.iter().fold(0, |bits, index| bits | index ^ index >> 63);
+        let largest = || found.iter().copied().max_by_key(|index| index.unsigned_abs());
+        ensure!(bits < 2 * LARGEST, damaged(largest().unwrap_or(0)));
         Ok(())
     }
 }
