@@ -60,8 +60,8 @@ pub(super) fn with_walks(
     // What walks already is too little.
     let before = best.walk.map_or(0.0, |walk| walk.deviation);
     let largest = LARGEST * known.size;
-    // As many anchors as the state has unknowns: with fewer, biases that walk explain anything.
-    if before >= largest || best.usable(|_| true) < known.axes + 2 {
+    // More anchors than the state has unknowns: with fewer, biases that walk explain anything.
+    if before >= largest || best.usable(|_| true) <= known.axes + 2 {
         return Vec::new();
     }
     let made = WALKS.iter().enumerate().map(|(number, (times, ranges))| {
