@@ -307,9 +307,9 @@ fn peak_of<const S: usize>(search: &Search<'_>, start: &[f64], rows: &Rows<'_>) 
         root: [[0.0; MOST]; MOST],
         log_evidence,
     };
-    for i in 0..S {
-        found.x[i] = x[i];
-        found.root[i][..S].copy_from_slice(&factor[i]);
+    found.x[..S].copy_from_slice(&x);
+    for (row, own) in found.root.iter_mut().zip(&factor) {
+        row[..S].copy_from_slice(own);
     }
     let is_finite = log_evidence.is_finite() && x.iter().all(|x| x.is_finite());
     is_finite.then_some(found)

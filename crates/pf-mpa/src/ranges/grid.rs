@@ -179,7 +179,7 @@ impl<'a> Grid<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ranges::RangeSettings;
+    use crate::ranges::settings::RangeSettings;
     use nalgebra::{DMatrix, DVector, Vector3};
 
     /// The density is that of ranges with a common covariance: noise, and what bias and scale do to all of them.

@@ -8,6 +8,7 @@
 //! acquisition  the first range of each anchor is sent in full; all places that explain them become hypotheses, with and without one anchor
 //! tracking     each range is sent as the level of its innovation, or in full; with probability `outliers` it is unrelated to the state
 //! anchors      each has a probability that its ranges depend on the distance, since one that contradicts the others does so again
+//! walks        where residuals last, hypotheses in which the biases of single anchors walk are added
 //! speed, noise a bank of filters in each hypothesis, weighted by evidence; works with 1 bit too
 //! odometry     a displacement moves all places; speed and its filters are then those of its error
 //! output       the moments, and the bands, of all hypotheses together

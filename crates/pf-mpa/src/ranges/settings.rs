@@ -40,7 +40,7 @@ const STATED: f64 = 4.0;
 const NEGLIGIBLE: f64 = 1e-4;
 pub(super) const NEGLIGIBLE_OF_LEVELS: f64 = 5e-5;
 /// Share of the first places that is left out.
-const NEEDLESS: f64 = 3e-3;
+const NEEDLESS: f64 = 1e-3;
 pub(super) const NEEDLESS_OF_LEVELS: f64 = 1e-3;
 /// A filter of more weight in its hypothesis is kept, however improbable the hypothesis is.
 const LEAST_WEIGHT: f64 = 3e-3;

@@ -8,12 +8,11 @@ use super::residuals::Residuals;
 use super::settings::Known;
 use super::walk::Walk;
 
-/// Deviations of the biases as multiples of the root of the mean product of neighbouring residuals: constant biases have taken up a part.
-const TIMES: f64 = 1.5;
+/// Deviations of the biases as multiples of the root of the mean product of neighbouring residuals, and ranges of an anchor after which its bias is
+/// forgotten. A slow walk is taken for motion, so that residuals show a small part of it.
+const WALKS: [(f64, f64); 3] = [(1.5, 6.0), (1.5, 50.0), (3.0, 200.0)];
 /// They are at most this share of the spread of the anchors: larger ones explain a wrong place.
-const LARGEST: f64 = 0.1;
-/// Ranges of an anchor after which its bias is forgotten.
-const FORGOTTEN: [f64; 2] = [6.0, 50.0];
+const LARGEST: f64 = 0.05;
 /// Share of the best hypothesis that each copy takes.
 const TAKEN: f64 = 0.02;
 /// Copies are added from this mean product of neighbouring residuals on, in their deviations, if it is above zero by so many of its own.
@@ -49,7 +48,7 @@ pub(super) fn with_walks(
     if variance <= 0.0 || sum < LASTING * weight || sum < SURE * variance.sqrt() || squares <= 0.0 || seconds <= 0.0 {
         return Vec::new();
     }
-    let found = TIMES * (squares / weight).sqrt();
+    let found = (squares / weight).sqrt();
     residuals.iter_mut().for_each(Residuals::forget_recent);
     let Some(best) = hypotheses
         .iter_mut()
@@ -60,11 +59,13 @@ pub(super) fn with_walks(
     let anchors = best.good.len();
     // What walks already is too little.
     let before = best.walk.map_or(0.0, |walk| walk.deviation);
-    let deviation = found.hypot(before).min(LARGEST * known.size);
-    if deviation <= before {
+    let largest = LARGEST * known.size;
+    // More anchors than the state has unknowns: with fewer, biases that walk explain anything.
+    if before >= largest || best.usable(|_| true) <= known.axes + 2 {
         return Vec::new();
     }
-    let made = FORGOTTEN.iter().enumerate().map(|(number, ranges)| {
+    let made = WALKS.iter().enumerate().map(|(number, (times, ranges))| {
+        let deviation = (times * found).hypot(before).min(largest);
         let mut copy = best.clone();
         copy.log_weight += TAKEN.ln();
         copy.walk = Some(Walk {
@@ -78,6 +79,6 @@ pub(super) fn with_walks(
         copy
     });
     let made: Vec<Hypothesis> = made.collect();
-    best.log_weight += (1.0 - TAKEN * FORGOTTEN.len() as f64).ln();
+    best.log_weight += (1.0 - TAKEN * WALKS.len() as f64).ln();
     made
 }
