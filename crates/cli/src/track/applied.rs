@@ -5,7 +5,7 @@ use crate::arguments::{Model, TrackOptions};
 use crate::error::Error;
 use crate::numbers::short;
 use crate::say::say;
-use fewbits_filters::fit::SensorModel;
+use fewbits_filters::fit::{FaultKind, SensorModel};
 use fewbits_table::names::quoted;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -29,6 +29,12 @@ pub(crate) struct Found {
     /// Names, value and standard error of each correlation of noises.
     #[serde(default)]
     pub(crate) correlations: Vec<(String, String, f64, f64)>,
+    /// Faults that are no parameters: sensor, kind, size and evidence in nats.
+    #[serde(default)]
+    pub(super) faults: Vec<(String, FaultKind, f64, f64)>,
+    /// Sensors whose readings the model does not explain.
+    #[serde(default)]
+    pub(super) not_explained: Vec<String>,
     pub(super) log_likelihood: f64,
 }
 
@@ -171,10 +177,15 @@ pub(super) fn applied(options: &TrackOptions, names: &[String]) -> Result<(Track
     match found.time_constant {
         Some(seconds) if is_walk && options.change.is_none() => {
             let variance = found.settled(seconds);
-            // The deviation from the forecast after a second.
-            let after = (-variance * (-2.0 / seconds).exp_m1()).sqrt();
+            // After a second a level that returns at once has forgotten all, and its time constant could not be told.
+            let (within, text) = match (0.5e9 * seconds).round().max(1.0) {
+                nanoseconds if seconds < 1.0 => (1e-9 * nanoseconds, format!("{nanoseconds}ns")),
+                _ => (1.0, "1s".to_owned()),
+            };
+            // The deviation from the forecast after that time.
+            let after = (-variance * (-2.0 * within / seconds).exp_m1()).sqrt();
             options.model = Some(Model::Returning);
-            options.change = Some(format!("{after}/1s"));
+            options.change = Some(format!("{after}/{text}"));
             options.prior = options.prior.or(found.prior_option());
         }
         None if is_walk && options.change.is_none() => {

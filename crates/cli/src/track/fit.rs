@@ -2,6 +2,7 @@
 
 use super::applied::{Found, Sensor};
 use super::columns::Kind;
+use super::faults;
 use super::first::values_of;
 use super::hints::{circle, growth};
 use super::instant::{Instant, Qualifier};
@@ -283,6 +284,17 @@ fn stored(found: &Fit, names: &[String], bits: &[usize]) -> Found {
             .iter()
             .map(|one| (names[one.sensors.0].clone(), names[one.sensors.1].clone(), one.value, one.standard_error))
             .collect(),
+        faults: found
+            .faults
+            .iter()
+            .map(|one| (names[one.sensor].clone(), one.kind, one.size, one.evidence))
+            .collect(),
+        not_explained: found
+            .tests
+            .iter()
+            .filter(|one| !one.is_passed())
+            .map(|one| names[one.sensor].clone())
+            .collect(),
         log_likelihood: found.log_likelihood,
     }
 }
@@ -344,6 +356,7 @@ fn page(
             names[one.sensors.0], names[one.sensors.1]
         );
     }
+    found.faults.iter().for_each(|one| text += &faults::line(one, names));
     for one in &found.tests {
         let name = &names[one.sensor];
         let word = if one.is_passed() {

@@ -43,6 +43,7 @@ mod derived;
 mod divisor;
 mod doubts;
 mod estimator;
+mod faults;
 mod first;
 mod fit;
 mod followed;
