@@ -44,6 +44,37 @@ fn option(error: recipe::Error) -> Error {
     }
 }
 
+/// Ranges in which angles are written: the lower end and the period.
+const CIRCLES: [(f64, f64); 4] = [
+    (0.0, 360.0),
+    (-180.0, 360.0),
+    (0.0, std::f64::consts::TAU),
+    (-std::f64::consts::PI, std::f64::consts::TAU),
+];
+/// Share of such a range at either end in which angles lie, and share of the values there, at least.
+const END: f64 = 0.05;
+const AT_END: f64 = 0.01;
+/// Values of which this is told, at least.
+const FEWEST: usize = 30;
+
+/// The range and period of values that may be angles, since they reach both of its ends, and what to add so that the widest gap between two is at the ends.
+fn angles(values: &[f64]) -> Option<(f64, f64, f64)> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let (least, most) = (*sorted.first()?, *sorted.last()?);
+    let needed = (AT_END * sorted.len() as f64).max(2.0);
+    let is_at_ends = |(low, period): &&(f64, f64)| {
+        let below = sorted.partition_point(|one| *one < low + END * period);
+        let above = sorted.len() - sorted.partition_point(|one| *one <= low + (1.0 - END) * period);
+        least >= *low && most <= low + period && (below.min(above) as f64) >= needed
+    };
+    let (low, period) = *CIRCLES.iter().find(is_at_ends).filter(|_| sorted.len() >= FEWEST)?;
+    let widest = sorted
+        .windows(2)
+        .max_by(|one, other| (one[1] - one[0]).total_cmp(&(other[1] - other[0])))?;
+    Some((low, period, low + period - 0.5 * (widest[0] + widest[1])))
+}
+
 /// Reads the sample of the unknown.
 fn sample(options: &DesignOptions, file: &str) -> Result<Prior, Error> {
     let mut table = Table::open(&TableOptions {
@@ -67,6 +98,16 @@ fn sample(options: &DesignOptions, file: &str) -> Result<Prior, Error> {
     }
     if values.is_empty() {
         return Err(Error::empty(table.file(), "numbers in the column of the sample"));
+    }
+    if let Some((low, period, turn)) = angles(&values) {
+        say!(
+            "the sample reaches both ends of {} to {}: if these are angles, values of both ends are far apart to a design. Turn them first, and each \
+             measurement: add {} and take the remainder by {}",
+            short(low),
+            short(low + period),
+            short(turn),
+            short(period)
+        );
     }
     let prior = design::prior_of(&values).map_err(option)?;
     if let Some(fit) = prior.sample_fit() {

@@ -62,9 +62,21 @@ impl Bearing {
     }
 }
 
+impl Bearing {
+    /// The way to a target, or half of it where the whole is beyond all numbers.
+    fn way(&self, at: &Vector2<f64>) -> Vector2<f64> {
+        let way = at - self.position;
+        if way.amax() < f64::INFINITY {
+            way
+        } else {
+            at * 0.5 - self.position * 0.5
+        }
+    }
+}
+
 impl Sensing<2, 1> for Bearing {
     fn mean(&self, at: &Vector2<f64>) -> Vector1<f64> {
-        let d = at - self.position;
+        let d = self.way(at);
         Vector1::new(if self.is_compass {
             d[0].atan2(d[1]).to_degrees().rem_euclid(360.0)
         } else {
@@ -74,8 +86,10 @@ impl Sensing<2, 1> for Bearing {
 
     /// Zero at the sensor itself, where there is none.
     fn jacobian(&self, at: &Vector2<f64>) -> RowVector2<f64> {
-        let d = at - self.position;
-        let distance = d.norm();
+        let d = self.way(at);
+        let norm = d.norm();
+        // Squares may be beyond all numbers, or vanish.
+        let distance = if norm.is_normal() { norm } else { d[0].hypot(d[1]) };
         if distance == 0.0 {
             return RowVector2::zeros();
         }

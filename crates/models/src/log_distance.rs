@@ -62,11 +62,22 @@ impl<const D: usize> LogDistance<D> {
     fn squared_distance(&self, at: &SVector<f64, D>) -> f64 {
         (at - self.position).norm_squared()
     }
+
+    /// Where a place is whose squared distance is beyond all numbers: a scale, and the difference from the position in that scale.
+    fn far(&self, at: &SVector<f64, D>) -> (f64, SVector<f64, D>) {
+        let half = at * 0.5 - self.position * 0.5;
+        let scale = half.amax();
+        (scale, half / scale * 2.0)
+    }
 }
 
 impl<const D: usize> Sensing<D, 1> for LogDistance<D> {
     fn mean(&self, at: &SVector<f64, D>) -> Vector1<f64> {
         let squared = self.squared_distance(at).max(SHORTEST * SHORTEST);
+        if squared == f64::INFINITY {
+            let (scale, direction) = self.far(at);
+            return Vector1::new(self.level - 10.0 * self.exponent * (scale.log10() + direction.norm().log10()));
+        }
         Vector1::new(self.level - 5.0 * self.exponent * squared.log10())
     }
 
@@ -74,6 +85,10 @@ impl<const D: usize> Sensing<D, 1> for LogDistance<D> {
         let squared = self.squared_distance(at);
         if squared <= SHORTEST * SHORTEST {
             return SMatrix::zeros();
+        }
+        if squared == f64::INFINITY {
+            let (scale, direction) = self.far(at);
+            return direction.transpose() * (-10.0 * self.exponent / LN_10 / direction.norm_squared() / scale);
         }
         (at - self.position).transpose() * (-10.0 * self.exponent / LN_10 / squared)
     }

@@ -1,6 +1,7 @@
 //! The task `fit`: calibration from a whole table; its file.
 
 use super::columns::Kind;
+use super::faults;
 use super::level_options::limits;
 use super::rows;
 use crate::Ending;
@@ -166,6 +167,7 @@ fn page(calibrated: &Calibrated, names: &[String], bits: &[usize], rows: &[Insta
             names[one.sensors.0], names[one.sensors.1]
         );
     }
+    found.faults.iter().for_each(|one| text += &faults::line(one, names));
     for one in &found.tests {
         let name = &names[one.sensor];
         let word = if one.is_passed() {

@@ -8,13 +8,14 @@
 //! | `range_rows`, `range_options`, `path` | the task `ranges`: a sheet of places, its options, its picture |
 //! | `anchors`, `target`, `targets` | the table of anchors, several targets in one table |
 //! | `leak` | the task `leak`: a room, and the file of rooms |
-//! | `calibration` | the task `fit`: calibration, and its file |
+//! | `calibration`, `faults` | the task `fit`: calibration, its file, what it says of faults |
 //!
 //! What is estimated, and what is told of it, is `fewbits_tracking`.
 
 mod anchors;
 pub(crate) mod calibration;
 mod columns;
+mod faults;
 mod leak;
 mod level;
 mod level_options;

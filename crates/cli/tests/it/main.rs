@@ -8,6 +8,7 @@ mod decided;
 mod design;
 mod doors;
 mod fit;
+mod fit_faults;
 mod fleet;
 mod fresh;
 mod kills;

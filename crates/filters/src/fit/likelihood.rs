@@ -141,7 +141,9 @@ impl LevelModel {
             let (expected, variance) = filter.expected(one.sensor, model);
             let expected = expected + model.bias + model.slope * (one.seconds - scale.begin);
             let said = one.reading.said(expected, variance.max(0.0), model.noise, None)?;
-            let doubted = said.doubted(WILD, one.reading.wild(WILD, scale.ranges[one.sensor]));
+            let wild = || (WILD, one.reading.wild(WILD, scale.ranges[one.sensor]));
+            let (share, density) = one.chance.unwrap_or_else(wild);
+            let doubted = said.doubted(share, density);
             product *= doubted.density;
             let is_in_range = (TINY..HUGE).contains(&product);
             if !is_in_range {

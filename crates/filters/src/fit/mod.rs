@@ -11,7 +11,9 @@
 //! What the readings cannot tell is refused with the reason, never guessed: nothing says what all sensors have in common, so without a reference
 //! faults are relative to one of the sensors.
 
+mod correlations;
 mod errors;
+mod faults;
 mod filter;
 mod likelihood;
 mod model;
@@ -22,11 +24,14 @@ mod readings;
 mod search;
 mod start;
 mod tests_of_fit;
+mod wander;
 
+pub use correlations::Correlation;
+pub use faults::{Fault, FaultKind};
 pub use model::{LevelModel, SensorModel};
 pub use parameters::{Estimate, Quantity, Refusal};
 pub use posterior::WeightedModel;
-pub use tests_of_fit::{Correlation, SensorTest};
+pub use tests_of_fit::SensorTest;
 
 use crate::Error;
 use crate::calibration::Instant;
@@ -73,7 +78,7 @@ pub struct Fit {
     pub estimates: Vec<Estimate>,
     /// Every parameter that was asked for and not found.
     pub refused: Vec<Refusal>,
-    /// `ln p` of all readings.
+    /// `ln p` of all readings. Absent values, also those that lie beyond a limit, count nothing.
     pub log_likelihood: f64,
     /// Seconds at which the level jumped.
     pub jumps: Vec<f64>,
@@ -81,6 +86,9 @@ pub struct Fit {
     pub tests: Vec<SensorTest>,
     /// Correlations between the noises of two sensors, less what both share with the one to which they are relative.
     pub correlations: Vec<Correlation>,
+    /// Faults of sensors that are no parameters, and explain the readings far better.
+    #[serde(default)]
+    pub faults: Vec<Fault>,
     /// Seconds in which the level returns to a mean, if that was not looked for and makes the readings likelier by 11 nats than a return in ten
     /// times the table's length: walks are seldom.
     pub returns: Option<f64>,
@@ -188,6 +196,10 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
     }
     let mut problem = Problem::new(instants, scale, starts, free).asking(goes_on);
     problem.solve();
+    let bits: Vec<usize> = (0..sensors)
+        .filter(|sensor| useless[*sensor].is_none() && series[*sensor].is_empty())
+        .collect();
+    let mut faults = problem.take_absent(instants, &bits);
     if request.time_constant {
         problem.try_time_constant(&mut refused);
     }
@@ -204,11 +216,15 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
     if problem.part.is_none() {
         estimates.iter_mut().for_each(|one| posterior::widen(one, &posterior));
     }
-    let (log_likelihood, residuals) = problem.model.log_likelihood(instants)?;
+    let log_likelihood = problem.model.log_likelihood(instants)?.0;
+    let mut residuals = vec![Vec::new(); sensors];
+    let scored = |sensor: usize, score: f64| residuals[sensor].push(score);
+    problem.model.run(&problem.readings, &problem.scale, scored);
     let jumps = problem.model.jumps(&problem.readings, &problem.scale);
     let counts: Vec<usize> = problem.readings.by_sensor.iter().map(Vec::len).collect();
     let tests = tests_of_fit::of(&residuals, &counts);
-    let correlations = tests_of_fit::correlations(instants, &problem.model, relative_to);
+    let correlations = correlations::of(instants, &problem.model, relative_to);
+    faults.extend(problem.faults(instants, &bits, relative_to));
     let model = problem.model.clone();
     let returns = if request.time_constant { None } else { problem.returns() };
     Ok(Fit {
@@ -221,6 +237,7 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
         jumps,
         tests,
         correlations,
+        faults,
         returns,
     })
 }

@@ -7,17 +7,12 @@ use super::search::{Maximum, maximum};
 use crate::calibration::{Instant, median};
 use nalgebra::{DMatrix, DVector};
 
-/// A time constant, a walk or a drift is kept if it raises the likelihood by so many nats: one in twenty tests of a parameter that is zero does.
-/// A walk cannot be negative, so half of that is as much evidence.
-const WORTH: f64 = 2.0;
-const WORTH_OF_WALK: f64 = 1.35;
+/// A time constant or a drift is kept if it raises the likelihood by so many nats: one in twenty tests of a parameter that is zero does.
+pub(super) const WORTH: f64 = 2.0;
 /// The same of a level that returns, if nobody asked, beside one that returns in so many times the table's length: a walk stays within the readings
 /// by chance.
 const CERTAIN: f64 = 11.0;
 const LONG: f64 = 10.0;
-/// The same of a drift beside a walk, or in place of one: a drift of several deviations of the noise that is there loses more than ten by being taken for
-/// a walk.
-const WORTH_BESIDE_WALK: f64 = 6.0;
 /// Deviation of the logarithm of a change or a noise about the first guess: nothing may be taken for zero only because the readings do not
 /// tell it from zero.
 const VAGUE: f64 = 2.0;
@@ -25,7 +20,7 @@ const VAGUE: f64 = 2.0;
 const CLIMBS: usize = 3;
 /// A step that raises the likelihood by less ends a search: by a part, and where only the sizes of two maxima are compared.
 const LITTLE: f64 = 1e-6;
-const ENOUGH: f64 = 1e-2;
+pub(super) const ENOUGH: f64 = 1e-2;
 /// Half of the delays that are tried, in half intervals between readings.
 const DELAYS: i32 = 12;
 /// The same of a first search, in whole intervals.
@@ -54,8 +49,8 @@ pub(super) struct Problem<'a> {
     /// What explains the readings as well, or nearly.
     pub(super) left_out: Vec<Hypothesis>,
     /// Seconds of all readings, and between two.
-    length: f64,
-    interval: f64,
+    pub(super) length: f64,
+    pub(super) interval: f64,
     /// Whether the search goes on; otherwise no point is better than another.
     goes_on: &'a dyn Fn() -> bool,
 }
@@ -127,9 +122,14 @@ impl<'a> Problem<'a> {
     }
 
     pub(super) fn log_likelihood(&self, model: &LevelModel) -> f64 {
+        let part = self.part.as_ref().filter(|_| self.is_rough);
+        self.log_likelihood_of(part.unwrap_or(&self.readings), model)
+    }
+
+    /// The same of other readings.
+    pub(super) fn log_likelihood_of(&self, readings: &Readings, model: &LevelModel) -> f64 {
         let found = if (self.goes_on)() && model.check().is_ok() {
-            let part = self.part.as_ref().filter(|_| self.is_rough);
-            model.run(part.unwrap_or(&self.readings), &self.scale, |_, _| {})
+            model.run(readings, &self.scale, |_, _| {})
         } else {
             None
         };
@@ -138,6 +138,11 @@ impl<'a> Problem<'a> {
 
     /// The likelihood, less what changes and noises far from the first guess cost.
     pub(super) fn worth(&self, model: &LevelModel) -> f64 {
+        self.log_likelihood(model) - self.vagueness(model)
+    }
+
+    /// What changes and noises far from the first guess cost.
+    pub(super) fn vagueness(&self, model: &LevelModel) -> f64 {
         let far = |quantity: &Quantity| {
             let pair = match *quantity {
                 Quantity::Change => (model.change, self.guess.change),
@@ -146,7 +151,7 @@ impl<'a> Problem<'a> {
             };
             0.5 * ((pair.0 / pair.1).ln() / VAGUE).powi(2)
         };
-        self.log_likelihood(model) - self.free.iter().map(far).sum::<f64>()
+        self.free.iter().map(far).sum()
     }
 
     /// Climbs from several changes, each with the delays that fit best and without. Of a long table all but the last climb is about a part.
@@ -204,6 +209,13 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// Takes other readings, and climbs.
+    pub(super) fn replace(&mut self, readings: Readings) {
+        self.part = readings.part();
+        self.readings = readings;
+        self.climb();
+    }
+
     /// A model with the best of several delays about its own, one sensor after the other.
     fn with_best_delays(
         &self,
@@ -229,7 +241,7 @@ impl<'a> Problem<'a> {
         best
     }
 
-    fn take_best(&mut self, models: impl Iterator<Item = LevelModel>) {
+    pub(super) fn take_best(&mut self, models: impl Iterator<Item = LevelModel>) {
         let scored = models.map(|model| (self.worth(&model), model));
         if let Some((_, best)) = scored.max_by(|one, other| one.0.total_cmp(&other.0)) {
             self.model = best;
@@ -243,7 +255,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The same up to what a comparison needs. Of a long table the end of the climb is left out.
-    fn climb_nearly(&mut self) -> f64 {
+    pub(super) fn climb_nearly(&mut self) -> f64 {
         let known = self.climb_by_part();
         let little = if self.part.is_some() { ENOUGH } else { LITTLE };
         self.step_up(known, little).value
@@ -312,89 +324,16 @@ impl<'a> Problem<'a> {
     }
 
     /// Goes back to a model, and keeps the present one for the posterior.
-    fn leave_out(&mut self, model: LevelModel, free: Vec<Quantity>, worth: f64) {
+    pub(super) fn leave_out(&mut self, model: LevelModel, free: Vec<Quantity>, worth: f64) {
         let (model, free) = (std::mem::replace(&mut self.model, model), std::mem::replace(&mut self.free, free));
         self.left_out.push(Hypothesis { model, free, worth });
     }
 
     /// Ends the climb of the present model, and keeps another one for the posterior.
-    fn keep(&mut self, model: LevelModel, free: Vec<Quantity>, worth: f64) {
+    pub(super) fn keep(&mut self, model: LevelModel, free: Vec<Quantity>, worth: f64) {
         self.left_out.push(Hypothesis { model, free, worth });
         if self.part.is_some() {
             self.climb();
-        }
-    }
-
-    /// Which offsets wander, and which of them drift beside: a drift that is not certain would be extended beyond the readings.
-    pub(super) fn try_walks(&mut self, anchor: usize, refused: &mut Vec<Refusal>) {
-        for sensor in (0..self.model.sensors.len()).filter(|sensor| *sensor != anchor) {
-            if !self.free.contains(&Quantity::Bias(sensor)) {
-                continue;
-            }
-            let (before, free) = (self.model.clone(), self.free.clone());
-            let steady = self.worth(&before);
-            self.let_wander(sensor);
-            let found = self.climb_nearly();
-            if found < steady + WORTH_OF_WALK {
-                self.leave_out(before, free, found);
-                refused.push(Refusal {
-                    quantity: Quantity::Walk(sensor),
-                    reason: "an offset that does not wander explains the readings as well".to_owned(),
-                });
-            } else {
-                self.keep(before, free, steady);
-            }
-        }
-    }
-
-    /// Gives the offset of a sensor a walk to begin with.
-    fn let_wander(&mut self, sensor: usize) {
-        let whole = self.model.sensors[sensor].noise / self.length.sqrt();
-        self.free.push(Quantity::Walk(sensor));
-        let wandering = [0.5, 2.0, 8.0].map(|factor| {
-            let mut model = self.model.clone();
-            model.sensors[sensor].walk = factor * whole;
-            model
-        });
-        self.take_best(wandering.into_iter());
-    }
-
-    /// Leaves out the drifts without which the readings are explained as well, and, if `may_wander`, nearly as well by an offset that wanders: a walk
-    /// looks like a drift, and a drift is extended beyond the readings.
-    pub(super) fn try_without_slopes(&mut self, may_wander: bool, refused: &mut Vec<Refusal>) {
-        for sensor in 0..self.model.sensors.len() {
-            let slope = Quantity::Slope(sensor);
-            if !self.free.contains(&slope) {
-                continue;
-            }
-            let (before, free) = (self.model.clone(), self.free.clone());
-            let drifting = self.worth(&before);
-            self.free.retain(|quantity| *quantity != slope);
-            // The offset in the middle of the readings stays.
-            let model = &mut self.model.sensors[sensor];
-            model.bias += 0.5 * model.slope * self.length;
-            model.slope = 0.0;
-            let is_wandering = self.free.contains(&Quantity::Walk(sensor));
-            let most = if is_wandering { WORTH_BESIDE_WALK } else { WORTH };
-            let mut found = self.climb_nearly();
-            let mut is_left = found + most >= drifting;
-            if !is_left && may_wander && !is_wandering {
-                self.let_wander(sensor);
-                found = self.climb_nearly();
-                is_left = found + WORTH_BESIDE_WALK >= drifting;
-                if is_left {
-                    refused.retain(|one| one.quantity != Quantity::Walk(sensor));
-                }
-            }
-            if !is_left {
-                self.leave_out(before, free, found);
-            } else {
-                self.keep(before, free, drifting);
-                refused.push(Refusal {
-                    quantity: slope,
-                    reason: "an offset that does not drift explains the readings as well".to_owned(),
-                });
-            }
         }
     }
 }

@@ -15,6 +15,8 @@ pub(super) struct Told {
     pub(super) seconds: f64,
     pub(super) sensor: usize,
     pub(super) reading: Reading,
+    /// Probability that it comes by chance, whatever is measured, and its own probability then. `None`: that of wild readings.
+    pub(super) chance: Option<(f64, f64)>,
 }
 
 /// All readings.
@@ -35,16 +37,27 @@ impl Readings {
             seconds,
             sensor: *sensor,
             reading: *reading,
+            chance: None,
         });
         Self::new(told.collect(), sensors)
     }
 
+    /// In the order of time.
     fn new(told: Vec<Told>, sensors: usize) -> Self {
         let mut by_sensor = vec![Vec::new(); sensors];
         for (place, one) in told.iter().enumerate() {
             by_sensor[one.sensor].push(place);
         }
         Self { told, by_sensor }
+    }
+
+    /// These and others.
+    pub(super) fn with(&self, others: impl Iterator<Item = Told>) -> Self {
+        let mut told = self.told.clone();
+        told.extend(others);
+        // Of one time these come first.
+        told.sort_by(|one, other| one.seconds.total_cmp(&other.seconds));
+        Self::new(told, self.by_sensor.len())
     }
 
     /// Stretches of readings that are spread over a long table: their likelihood is that of fewer readings of the same model. `None` if the

@@ -10,6 +10,7 @@ mod circle;
 mod contract;
 mod failure;
 mod fit;
+mod fit_faults;
 mod fit_worlds;
 mod hooks;
 mod imm;

@@ -1,7 +1,9 @@
 //! Wild arguments: every constructor and step of this crate returns numbers or an error.
 
 use fewbits_core::{Dynamics, GaussianDynamics, Sensing};
-use fewbits_models::{Ar1, LinearGaussian, LinearSensor, ReceivedPower, constant_velocity_1d, constant_velocity_2d};
+use fewbits_models::{
+    Ar1, Bearing, LinearGaussian, LinearSensor, LogDistance, ReceivedPower, constant_velocity_1d, constant_velocity_2d,
+};
 use nalgebra::{Matrix2, Vector1, Vector2, Vector4};
 use proptest::prelude::*;
 use rand::SeedableRng;
@@ -64,5 +66,23 @@ proptest! {
                 prop_assert!(numbers(stationary.as_slice()), "{:?}: {}", linear, stationary);
             }
         }
+    }
+}
+
+/// Defects: the level heard from 1e300 away was minus infinity, and the slope of a bearing there, or 1e-200 away, was zero.
+#[test]
+fn places_whose_squares_are_no_numbers_are_sensed() {
+    let beacon = LogDistance::new(Vector2::new(0.0, -1e300), -50.0, 2.0, 4.0).unwrap();
+    let far = Vector2::new(0.0, 1e300);
+    assert!((beacon.mean(&far)[0] - (-50.0 - 20.0 * 2e300_f64.log10())).abs() < 1e-9);
+    // Slope: -10 exponent / ln 10 / distance.
+    let slope = -20.0 / std::f64::consts::LN_10 / 2e300;
+    assert!((beacon.jacobian(&far)[1] / slope - 1.0).abs() < 1e-12);
+    let sensor = Bearing::new(Vector2::zeros(), 0.01).unwrap();
+    for scale in [1e-200, 1e200, 1e300] {
+        let at = Vector2::new(3.0 * scale, 4.0 * scale);
+        assert!((sensor.mean(&at)[0] - 4_f64.atan2(3.0)).abs() < 1e-15);
+        let slopes = sensor.jacobian(&at) * scale;
+        assert!((slopes[0] + 4.0 / 25.0).abs() < 1e-12 && (slopes[1] - 3.0 / 25.0).abs() < 1e-12, "{slopes}");
     }
 }

@@ -85,6 +85,10 @@ impl Density for Normal {
     fn squared_error(&self, a: f64, b: f64, point: f64) -> f64 {
         let s = self.deviation;
         let (a, b, point) = (a / s, b / s, point / s);
+        if point * point == f64::INFINITY {
+            // The square is beyond all numbers, and its share may not be. Any place with mass is as far from the point.
+            return (s * (normal::interval(a, b).sqrt() * point)).powi(2);
+        }
         if let Some((middle, half)) = narrow(a, b) {
             // phi(middle + t) = phi(middle) exp(-t (middle + t / 2)).
             let density = |t: f64| (-t * (middle + 0.5 * t)).exp() * (middle + t - point) * (middle + t - point);

@@ -76,7 +76,13 @@ impl<F: Fn(f64) -> f64> Density for SmoothDensity<F> {
     }
 
     fn squared_error(&self, a: f64, b: f64, point: f64) -> f64 {
-        self.integral(a, b, |x| (x - point) * (x - point))
+        let extent = self.low.abs().max(self.high.abs()).max(point.abs());
+        if extent < f64::MAX.sqrt() / 4.0 {
+            return self.integral(a, b, |x| (x - point) * (x - point));
+        }
+        // Squares are beyond all numbers, and their share may not be.
+        let share = self.integral(a, b, |x| (x / extent - point / extent).powi(2));
+        (share.sqrt() * extent).powi(2)
     }
 
     fn extent(&self) -> (f64, f64) {

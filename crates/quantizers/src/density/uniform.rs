@@ -54,7 +54,12 @@ impl Density for Uniform {
         let half = self.half();
         let (low, high) = (a.clamp(-half, half), b.clamp(-half, half));
         let (width, off) = ((high - low).max(0.0), 0.5 * (low + high) - point);
-        0.5 * width / half * (width * width / 12.0 + off * off)
+        let share = 0.5 * width / half;
+        if width * width + off * off < f64::INFINITY {
+            return share * (width * width / 12.0 + off * off);
+        }
+        // The squares are beyond all numbers, and their share may not be.
+        (share.sqrt() * (width / 12.0_f64.sqrt()).hypot(off)).powi(2)
     }
 
     fn extent(&self) -> (f64, f64) {

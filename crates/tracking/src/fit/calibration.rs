@@ -3,7 +3,7 @@
 use crate::level::options::{LevelOptions, Model};
 use crate::rows::correction::Correction;
 use crate::text::short;
-use fewbits_filters::fit::SensorModel;
+use fewbits_filters::fit::{FaultKind, SensorModel};
 use serde::{Deserialize, Serialize};
 
 /// What a calibration found. Its stored form, as JSON, is what `fewbits fit -o` writes.
@@ -29,6 +29,12 @@ pub struct Calibration {
     /// Names, value and standard error of each correlation of noises.
     #[serde(default)]
     pub correlations: Vec<(String, String, f64, f64)>,
+    /// Faults that are no parameters: sensor, kind, size and evidence in nats.
+    #[serde(default)]
+    pub faults: Vec<(String, FaultKind, f64, f64)>,
+    /// Sensors whose readings the model does not explain.
+    #[serde(default)]
+    pub not_explained: Vec<String>,
     /// Logarithm of the likelihood of all readings.
     pub log_likelihood: f64,
 }
@@ -99,10 +105,12 @@ impl Calibration {
         match self.time_constant {
             Some(seconds) if is_walk && options.change.is_none() => {
                 let variance = self.settled(seconds);
-                // The deviation from the forecast after a second.
-                let after = (-variance * (-2.0 / seconds).exp_m1()).sqrt();
+                // After a second a level that returns at once has forgotten all, and its time constant could not be told.
+                let within = f64::min(0.5 * seconds, 1.0);
+                // The deviation from the forecast after that time.
+                let after = (-variance * (-2.0 * within / seconds).exp_m1()).sqrt();
                 options.model = Some(Model::Returning);
-                options.change = Some((after, 1.0));
+                options.change = Some((after, within));
                 options.prior = options.prior.or(self.prior());
             }
             None if is_walk && options.change.is_none() => options.change = Some((self.change, 1.0)),

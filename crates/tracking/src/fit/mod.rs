@@ -261,6 +261,17 @@ fn stored(found: &Fit, names: &[String], bits: &[usize]) -> Calibration {
             .iter()
             .map(|one| (names[one.sensors.0].clone(), names[one.sensors.1].clone(), one.value, one.standard_error))
             .collect(),
+        faults: found
+            .faults
+            .iter()
+            .map(|one| (names[one.sensor].clone(), one.kind, one.size, one.evidence))
+            .collect(),
+        not_explained: found
+            .tests
+            .iter()
+            .filter(|one| !one.is_passed())
+            .map(|one| names[one.sensor].clone())
+            .collect(),
         log_likelihood: found.log_likelihood,
     }
 }
