@@ -155,7 +155,7 @@ fn with_fault(readings: &Readings, sensor: usize, kind: FaultKind, size: f64) ->
         }
         let shift = -size * before;
         let (lower, upper) = (lower + shift, upper + shift);
-        if !(lower < upper) {
+        if lower.partial_cmp(&upper) != Some(std::cmp::Ordering::Less) {
             return None;
         }
         before = if lower.is_finite() { 1.0 } else { -1.0 };
