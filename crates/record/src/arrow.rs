@@ -22,6 +22,7 @@ use arrow_array::types::{
 use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, RecordBatch, make_array};
 use arrow_schema::{DataType, Field, TimeUnit};
 use fewbits_block_codec::ArgumentError;
+use std::collections::HashMap;
 use std::io::Write;
 use std::sync::Arc;
 
@@ -62,8 +63,8 @@ impl Schema {
     /// The fields of batches of this recording. Units, and the decimals of ticks, are in the metadata.
     pub fn to_arrow(&self) -> arrow_schema::Schema {
         let field = |name: &str, kind, is_nullable, metadata: Option<(&str, String)>| {
-            let metadata = metadata.into_iter().map(|(key, value)| (key.to_owned(), value));
-            Field::new(name, kind, is_nullable).with_metadata(metadata.collect())
+            let metadata = metadata.map(|(key, value)| (key.to_owned(), value));
+            Field::new(name, kind, is_nullable).with_metadata(HashMap::from_iter(metadata))
         };
         let kind = type_of(self.time);
         let time = match self.time {
