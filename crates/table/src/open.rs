@@ -249,28 +249,26 @@ fn of_text(
     if own_names.is_empty() {
         return Err(Error::Empty);
     }
-    if dialect.encoding.is_none() && own_names.iter().any(|name| name.contains('\u{fffd}')) {
-        return Err(Error::Line {
-            place: Place {
-                line: first_line.saturating_sub(1).max(1),
-                row: 0,
-            },
-            problem: "the names are not text in UTF-8".to_owned(),
-            mend: "say how they are written, as --encoding latin1, windows-1251, shift_jis or gbk",
-        });
+    let refused = |problem: &str, mend: &'static str| {
+        let place = Place {
+            line: first_line.saturating_sub(1).max(1),
+            row: 0,
+        };
+        let problem = problem.to_owned();
+        Err(Error::Line { place, problem, mend })
+    };
+    let has = |marks: &[char]| own_names.iter().any(|name| name.contains(marks));
+    if dialect.encoding.is_none() && has(&['\u{fffd}']) {
+        return refused(
+            "the names are not text in UTF-8",
+            "say how they are written, as --encoding latin1, windows-1251, shift_jis or gbk",
+        );
     }
-    if own_names
-        .iter()
-        .any(|name| name.contains(['\u{85}', '\u{2028}', '\u{2029}']))
-    {
-        return Err(Error::Line {
-            place: Place {
-                line: first_line.saturating_sub(1).max(1),
-                row: 0,
-            },
-            problem: "lines end with U+0085, U+2028 or U+2029".to_owned(),
-            mend: "write ends of lines: perl -CSD -pe 's/[\\x{85}\\x{2028}\\x{2029}]/\\n/g' FILE | fewbits ... -",
-        });
+    if has(&['\u{85}', '\u{2028}', '\u{2029}']) {
+        return refused(
+            "lines end with U+0085, U+2028 or U+2029",
+            "write ends of lines: perl -CSD -pe 's/[\\x{85}\\x{2028}\\x{2029}]/\\n/g' FILE | fewbits ... -",
+        );
     }
     let lines: Vec<&str> = head.filled_lines().collect();
     if own_names.len() == 1
