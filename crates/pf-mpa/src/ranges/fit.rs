@@ -9,7 +9,8 @@
 use super::gaussian::Normal;
 use super::root::root;
 use super::rows::{Collected, Rows};
-use super::settings::{Known, Own};
+use super::own::Own;
+use super::settings::Known;
 
 /// What is known of bias and scale: mean and variance of each.
 pub(super) type Calibration = [(f64, f64); 2];

@@ -104,10 +104,13 @@ impl Normal {
 
     /// Whether means and variances are finite, and no variance is negative.
     pub(super) fn is_finite(&self) -> bool {
-        let variances = self.covariance.iter().step_by(self.mean.len() + 1);
         // `0 x` is zero for finite numbers only, and a sum needs no branch per number.
-        let rest: f64 = self.mean.iter().chain(variances.clone()).map(|x| 0.0 * x).sum();
-        rest == 0.0 && variances.fold(0.0_f64, |least, variance| least.min(*variance)) >= 0.0
+        let (mut rest, mut is_negative) = (0.0, false);
+        for (mean, variance) in self.mean.iter().zip(self.covariance.iter().step_by(self.mean.len() + 1)) {
+            rest += 0.0 * mean + 0.0 * variance;
+            is_negative |= *variance < 0.0;
+        }
+        rest == 0.0 && !is_negative
     }
 
     /// Moves the state by a step whose velocities have this variance.

@@ -3,8 +3,9 @@
 //! The first range of a little lateness may be one that the target has moved, and what is taken for that moves the place, so that good anchors
 //! contradict it afterwards. So a range that is longer than expected also begins a hypothesis in which it says nothing, until the next ranges decide.
 
-use super::bank::{ANCHOR_CHANGES, Hypothesis};
+use super::bank::Hypothesis;
 use super::settings::Known;
+use super::update::ANCHOR_CHANGES;
 
 /// A range is suspect from so many deviations above the expected one.
 const SUSPECT: f64 = 1.0;

@@ -19,7 +19,9 @@ mod acquisition;
 mod again;
 mod arrived;
 mod asked;
+mod band;
 mod bank;
+mod columns;
 mod estimate;
 mod fit;
 mod gaussian;
@@ -29,10 +31,12 @@ mod heights;
 mod late;
 mod line;
 mod measured;
+mod members;
 mod mirror;
 mod mistakes;
 mod moved;
 mod odds;
+mod own;
 mod push;
 mod residuals;
 mod rest;
@@ -41,6 +45,7 @@ mod rows;
 mod search;
 mod settings;
 mod step;
+mod update;
 mod walk;
 mod walking;
 
@@ -327,7 +332,7 @@ impl RangeTracker {
                         .map(|(one, share)| share * (1.0 - one.good[anchor]))
                         .sum();
                     let size =
-                        uncertainty_of_noise(&known.log_noises, next, &shares).max(ASIDE * doubt) * variance.sqrt();
+                        uncertainty_of_noise(&known.bank, next, &shares).max(ASIDE * doubt) * variance.sqrt();
                     if is_above { size } else { -size }
                 } else {
                     0.0
@@ -355,7 +360,7 @@ impl RangeTracker {
         next.retain_mut(|one| {
             let short = is_short(one);
             let holds_scale = one.rests(known, short) || (!one.is_cut && short);
-            match one.update(known, anchor, &arrived, of_noise, holds_scale) {
+            match one.update(known, anchor, &arrived, holds_scale) {
                 Ok(log_evidence) if one.is_finite() => {
                     evidences.push((is_undecided || short && one.apart.is_some(), log_evidence));
                     true

@@ -2,6 +2,7 @@
 
 use super::bank::Hypothesis;
 use super::fit::Calibration;
+use super::members::Member;
 
 /// A hypothesis whose probability is less than this share of the best one's is dropped in any case.
 const LEAST: f64 = 1e-5;
@@ -203,11 +204,11 @@ pub(super) fn is_lost(hypotheses: &[Hypothesis], are_levels: bool) -> bool {
 }
 
 /// The deviation of `ln` of the noise over all filters, at most [`ASIDE`].
-pub(super) fn uncertainty_of_noise(log_noises: &[f64], hypotheses: &[Hypothesis], shares: &[f64]) -> f64 {
+pub(super) fn uncertainty_of_noise(bank: &[Member], hypotheses: &[Hypothesis], shares: &[f64]) -> f64 {
     let (mut mean, mut square) = (0.0, 0.0);
     for (one, share) in hypotheses.iter().zip(shares) {
         for i in &one.alive {
-            let (weight, log) = (one.weights[*i], log_noises[i % log_noises.len()]);
+            let (weight, log) = (one.weights[*i], bank[*i].log_noise);
             mean += share * weight * log;
             square += share * weight * log * log;
         }

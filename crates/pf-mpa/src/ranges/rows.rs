@@ -1,7 +1,7 @@
 //! Ranges that a place must explain.
 
 use super::measured::Measured;
-use super::settings::Own;
+use super::own::Own;
 
 /// The latest range of an anchor.
 #[derive(Debug, Clone, Copy)]

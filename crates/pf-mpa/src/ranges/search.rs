@@ -3,7 +3,7 @@
 use super::fit::{Peak, Search, peak};
 use super::gaussian::Normal;
 use super::rows::{Collected, Rows, Slice};
-use super::settings::Own;
+use super::own::Own;
 use nalgebra::DMatrix;
 
 /// Of the noises, every so many are tried for a place.
