@@ -62,9 +62,8 @@ impl Laws {
         }
         // The end of the normal law with the mixture's moments is near.
         let mean: f64 = (0..count).map(|i| self.shares[i] * self.means[i]).sum();
-        let variance = |(share, centre, deviation): (f64, f64, f64)| {
-            share * (deviation * deviation + (centre - mean).powi(2))
-        };
+        let variance =
+            |(share, centre, deviation): (f64, f64, f64)| share * (deviation * deviation + (centre - mean).powi(2));
         let spread: f64 = (0..count).map(|i| variance(self.law(i))).sum();
         let mut x = (mean + off * spread.sqrt()).clamp(low, high);
         for _ in 0..STEPS {

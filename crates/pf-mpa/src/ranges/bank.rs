@@ -1,7 +1,7 @@
 //! A hypothesis about the target: a bank of filters that differ in speed and noise, and how likely each anchor measures rightly.
 
 use super::columns::Columns;
-use super::gaussian::{Normal, Predicted, merge_into};
+use super::gaussian::{Normal, merge_into};
 use super::rest::Rest;
 use super::settings::Known;
 use super::step::Step;
@@ -46,7 +46,6 @@ pub(super) struct Hypothesis {
     /// A filter of less weight is left out.
     pub(super) negligible: f64,
     /// The next range, by each filter that is not left out.
-    pub(super) predicted: Vec<Predicted>,
     pub(super) columns: Columns,
     /// A buffer.
     mixed: Vec<Mixed>,
@@ -95,7 +94,6 @@ impl Clone for Hypothesis {
             ranges: self.ranges,
             rest: self.rest,
             negligible: self.negligible,
-            predicted: Vec::new(),
             columns: Columns::default(),
             mixed: Vec::new(),
         }
@@ -148,12 +146,16 @@ impl Hypothesis {
             ranges: 0,
             rest: Rest::default(),
             negligible: 0.0,
-            predicted: Vec::new(),
             columns: Columns::default(),
             mixed: Vec::new(),
         };
         made.count_alive();
         made
+    }
+
+    /// Number of coordinates of the state.
+    pub(super) fn size(&self) -> usize {
+        self.alive.first().map_or(0, |i| self.filters[*i].mean.len())
     }
 
     fn count_alive(&mut self) {
@@ -244,29 +246,29 @@ impl Hypothesis {
     pub(super) fn expect(&mut self, known: &Known, place: &[f64; 3], anchor: usize, of_noise: f64) -> (f64, f64) {
         let above = place[2] - known.level;
         let (mut mean, mut square) = (0.0, 0.0);
-        self.predicted
-            .resize_with(self.alive.len().max(self.predicted.len()), Predicted::default);
-        self.columns.clear();
-        for (i, out) in self.alive.iter().zip(&mut self.predicted) {
+        let size = self.size();
+        self.columns.clear(self.alive.len() * size);
+        for (k, i) in self.alive.iter().enumerate() {
             let (weight, noise) = (self.weights[*i], of_noise * known.bank[*i].noise);
-            self.filters[*i].range(known.measured, place, above, anchor, out);
-            let total = out.variance + noise * noise;
-            self.columns.push(out.mean, out.variance, total);
-            mean += weight * out.mean;
+            let cross = &mut self.columns.cross[k * size..][..size];
+            let found = self.filters[*i].range(known.measured, place, above, anchor, cross);
+            let total = found.variance + noise * noise;
+            self.columns.push(found, total);
+            mean += weight * found.mean;
             square += weight * total;
         }
-        let between = |(i, one): (&usize, &Predicted)| self.weights[*i] * (one.mean - mean).powi(2);
-        let filters = self.alive.iter().zip(&self.predicted);
+        let between = |(i, one): (&usize, &f64)| self.weights[*i] * (one - mean).powi(2);
+        let filters = self.alive.iter().zip(&self.columns.mean);
         (mean, square + filters.map(between).sum::<f64>())
     }
 
     /// Gives all filters an unknown bias: with it the next range is as expected.
     pub(super) fn forget_bias(&mut self, known: &Known, deviation: f64, place: &[f64; 3], anchor: usize, range: f64) {
-        let mut out = Predicted::default();
+        let mut cross = vec![0.0; self.size()];
         for i in &self.alive {
             let filter = &mut self.filters[*i];
-            filter.range(known.measured, place, place[2] - known.level, anchor, &mut out);
-            let bias = filter.mean[filter.bias()] + range - out.mean;
+            let found = filter.range(known.measured, place, place[2] - known.level, anchor, &mut cross);
+            let bias = filter.mean[filter.bias()] + range - found.mean;
             filter.forget_bias(bias, deviation * deviation);
         }
     }
@@ -307,10 +309,10 @@ impl Hypothesis {
             for ((off, mean), i) in off.iter_mut().zip(&mean).zip(coordinates) {
                 *off = part.mean[*i] - mean;
             }
-            for (a, i) in coordinates.iter().enumerate() {
-                let row = &part.covariance[i * n..(i + 1) * n];
-                for (b, j) in coordinates.iter().enumerate().take(a + 1) {
-                    covariance[a][b] += share * (row[*j] + off[a] * off[b]);
+            for a in 0..N {
+                let row = &part.covariance[coordinates[a] * n..][..n];
+                for b in 0..=a {
+                    covariance[a][b] += share * (row[coordinates[b]] + off[a] * off[b]);
                 }
             }
         }

@@ -7,9 +7,9 @@
 //! ```
 
 use super::gaussian::Normal;
+use super::own::Own;
 use super::root::root;
 use super::rows::{Collected, Rows};
-use super::own::Own;
 use super::settings::Known;
 
 /// What is known of bias and scale: mean and variance of each.

@@ -5,6 +5,7 @@
 
 use super::bank::Hypothesis;
 use super::settings::Known;
+use super::spare::Spare;
 use super::update::ANCHOR_CHANGES;
 
 /// A range is suspect from so many deviations above the expected one.
@@ -26,6 +27,7 @@ pub(super) fn with_late(
     anchor: usize,
     range: f64,
     has_enough: impl Fn(&Hypothesis) -> bool,
+    spare: &mut Spare,
 ) -> Vec<Hypothesis> {
     let mut found = Vec::new();
     let mean = LATENESS * known.size;
@@ -35,7 +37,7 @@ pub(super) fn with_late(
         let is_asked = *share > PROBABLE && hypotheses.len() + found.len() < MOST;
         if is_suspect && is_asked && one.good[anchor] > 0.5 && one.apart != Some(anchor) && has_enough(one) {
             let log_density = BEGINS.ln() - mean.ln() - off / mean;
-            let mut late = one.clone();
+            let mut late = spare.copy(one);
             late.good[anchor] = ANCHOR_CHANGES;
             late.weigh(log_density);
             found.push(late);

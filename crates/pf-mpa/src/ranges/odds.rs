@@ -3,6 +3,7 @@
 use super::bank::Hypothesis;
 use super::fit::Calibration;
 use super::members::Member;
+use super::spare::Spare;
 
 /// A hypothesis whose probability is less than this share of the best one's is dropped in any case.
 const LEAST: f64 = 1e-5;
@@ -123,12 +124,12 @@ pub(super) fn is_worth(log_ratio: f64, negligible: f64) -> bool {
 }
 
 /// Drops hypotheses that are improbable beside the best one. Returns what was taken off the `ln` of all weights: only differences matter.
-pub(super) fn drop_improbable(hypotheses: &mut Vec<Hypothesis>, negligible: f64) -> f64 {
+pub(super) fn drop_improbable(hypotheses: &mut Vec<Hypothesis>, negligible: f64, spare: &mut Spare) -> f64 {
     let best = hypotheses
         .iter()
         .map(Hypothesis::log_share)
         .fold(f64::NEG_INFINITY, f64::max);
-    hypotheses.retain(|one| is_worth(one.log_share() - best, negligible));
+    spare.retain(hypotheses, |one| is_worth(one.log_share() - best, negligible));
     if !best.is_finite() {
         return 0.0;
     }
@@ -137,7 +138,7 @@ pub(super) fn drop_improbable(hypotheses: &mut Vec<Hypothesis>, negligible: f64)
 }
 
 /// Of hypotheses about the same place with the same model, keeps the most probable, with the probability of all.
-pub(super) fn merge_same(hypotheses: &mut Vec<Hypothesis>, axes: usize) {
+pub(super) fn merge_same(hypotheses: &mut Vec<Hypothesis>, axes: usize, spare: &mut Spare) {
     if hypotheses.len() < 2 {
         return;
     }
@@ -160,7 +161,7 @@ pub(super) fn merge_same(hypotheses: &mut Vec<Hypothesis>, axes: usize) {
             None => kept.push(i),
         }
     }
-    hypotheses.retain_mut(|one| {
+    spare.retain(hypotheses, |one| {
         one.log_weight += gained[number];
         number += 1;
         kept.contains(&(number - 1))

@@ -2,8 +2,8 @@
 
 use super::fit::{Peak, Search, peak};
 use super::gaussian::Normal;
-use super::rows::{Collected, Rows, Slice};
 use super::own::Own;
+use super::rows::{Collected, Rows, Slice};
 use nalgebra::DMatrix;
 
 /// Of the noises, every so many are tried for a place.

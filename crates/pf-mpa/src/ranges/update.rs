@@ -47,10 +47,12 @@ impl Hypothesis {
     ) -> Result<f64, Error> {
         let stray = arrived.stray(known.stray);
         arrived.right(&mut self.columns)?;
+        let size = self.size();
         if matches!(arrived, Arrived::First(_)) {
-            let moments = self.columns.after.iter().zip(&self.columns.left);
-            for ((i, predicted), (mean, variance)) in self.alive.iter().zip(&self.predicted).zip(moments) {
-                self.filters[*i].condition(predicted, *mean, *variance, holds_scale);
+            let columns = &self.columns;
+            for (k, i) in self.alive.iter().enumerate() {
+                let moments = (columns.after[k], columns.left[k]);
+                self.filters[*i].condition(columns.expected(k, size), moments, holds_scale);
             }
             return Ok(0.0);
         }
@@ -60,9 +62,10 @@ impl Hypothesis {
         let (mut total, mut agreeing, mut score) = (0.0, 0.0, 0.0);
         let old: f64 = self.alive.iter().map(|i| self.weights[*i]).sum();
         let columns = &self.columns;
-        for (k, (i, predicted)) in self.alive.iter().copied().zip(&self.predicted).enumerate() {
+        for (k, i) in self.alive.iter().copied().enumerate() {
             let weight = self.weights[i] / old;
-            self.filters[i].condition(predicted, columns.after[k], columns.left[k], holds_scale);
+            let moments = (columns.after[k], columns.left[k]);
+            self.filters[i].condition(columns.expected(k, size), moments, holds_scale);
             score += weight * columns.score[k].clamp(-3.0, 3.0);
             self.weights[i] = weight * columns.evidence[k];
             total += self.weights[i];
