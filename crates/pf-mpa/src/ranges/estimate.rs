@@ -155,13 +155,16 @@ fn is_doubtful(known: &Known, parts: &[Part]) -> bool {
     }
     let priors = [(BIAS, known.bias), (SCALE, known.scale)];
     let asked: Vec<(usize, f64)> = priors.into_iter().filter(|(_, prior)| *prior > 0.0).collect();
-    let mean = |i: usize| parts.iter().map(|one| one.share * one.mean[i]).sum::<f64>();
+    let mut means = [0.0; 5];
+    for i in [BIAS, SCALE] {
+        means[i] = parts.iter().map(|one| one.share * one.mean[i]).sum();
+    }
     // In deviations of the priors.
     let covariance = |(i, of_i): (usize, f64), (j, of_j): (usize, f64)| {
-        let one = |one: &Part| one.share * (one.covariance[i][j] + (one.mean[i] - mean(i)) * (one.mean[j] - mean(j)));
+        let one = |one: &Part| one.share * (one.covariance[i][j] + (one.mean[i] - means[i]) * (one.mean[j] - means[j]));
         parts.iter().map(one).sum::<f64>() / (of_i * of_j)
     };
-    let off = |(i, of): (usize, f64)| mean(i) / of;
+    let off = |(i, of): (usize, f64)| means[i] / of;
     // One of the two alone, where the ranges tell of the other nothing.
     let is_far = |one: (usize, f64)| {
         let left = 1.0 - covariance(one, one);
