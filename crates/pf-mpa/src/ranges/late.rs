@@ -24,8 +24,7 @@ pub(super) fn with_late(
     hypotheses: &[Hypothesis],
     expectations: &[(f64, f64)],
     shares: &[f64],
-    anchor: usize,
-    range: f64,
+    (anchor, range): (usize, f64),
     has_enough: impl Fn(&Hypothesis) -> bool,
     spare: &mut Spare,
 ) -> Vec<Hypothesis> {

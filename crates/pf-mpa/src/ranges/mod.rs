@@ -329,7 +329,7 @@ impl RangeTracker {
         let is_undecided = next.iter().all(is_short);
         let enough = |one: &Hypothesis| one.usable(|other| last - heard[other] <= known.silence) > known.axes + 1;
         let mut late = match arrived {
-            Arrived::Value(value) => with_late(known, next, &expectations, &shares, anchor, value, enough, spare),
+            Arrived::Value(value) => with_late(known, next, &expectations, &shares, (anchor, value), enough, spare),
             _ => Vec::new(),
         };
         let mut evidences: Vec<(bool, f64)> = Vec::with_capacity(next.len());
