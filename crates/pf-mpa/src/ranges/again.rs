@@ -3,7 +3,8 @@
 use super::acquisition::hypotheses;
 use super::odds::{calibration_of, drop_improbable};
 use super::residuals::Residuals;
-use super::rows::Collected;
+use super::rows::{Collected, Latest};
+use super::spare::Spare;
 use super::{RangeTracker, Travel};
 use nalgebra::Vector3;
 
@@ -37,7 +38,7 @@ impl RangeTracker {
 
     fn begin(&mut self) {
         // The target may be as far from the anchors as it was.
-        if let Some(found) = self.estimate(false) {
+        if let Some(found) = self.latest.take() {
             let (spread, middle) = (self.known.anchors_spread, Vector3::from(self.known.middle));
             let far = (found.position - middle).xy().norm();
             self.known.spreads[..2].fill(far.clamp(spread, FARTHEST * spread));
@@ -46,6 +47,38 @@ impl RangeTracker {
         self.tried = 0;
         if self.travel != Travel::Full {
             self.collected.clear();
+        }
+    }
+
+    /// Collects a range, and looks for places once there are enough.
+    pub(super) fn search(&mut self, time: f64, is_new: bool, anchor: usize, found: Latest) {
+        let least = self.known.axes + 1;
+        if self.known.clock.is_some() && is_new {
+            // The ranges of one time are complete.
+            if self.collected.len() >= least {
+                self.acquire(self.last);
+            }
+            self.collected.clear();
+            if !self.hypotheses.is_empty() {
+                let (mut next, mut spare) = (self.hypotheses.clone(), Spare::default());
+                let range = (found.range, found.share);
+                if let Ok((taken, ..)) = self.track((&mut next, &mut spare), time - self.at, true, anchor, range) {
+                    self.hypotheses = next;
+                    self.at = time;
+                    self.evidence += taken;
+                }
+                return;
+            }
+        }
+        let silence = self.known.silence;
+        self.collected.retain(|_, latest| time - latest.time <= silence);
+        self.collected.insert(anchor, found);
+        self.tried += 1;
+        // An anchor that never answers is not waited for.
+        let is_enough = self.collected.len() >= self.needed();
+        let has_waited = self.collected.len() >= least && self.tried >= 2 * self.places.len();
+        if is_enough || has_waited && self.known.clock.is_none() {
+            self.acquire(time);
         }
     }
 
@@ -60,7 +93,7 @@ impl RangeTracker {
         self.hypotheses = hypotheses(&self.known, self.places.len(), self.calibration, &rows);
         self.tried = 0;
         let mut found = std::mem::take(&mut self.hypotheses);
-        self.evidence = drop_improbable(&mut found, self.known.negligible);
+        self.evidence = drop_improbable(&mut found, self.known.negligible, &mut self.spare);
         self.hypotheses = found;
         self.at = time;
     }

@@ -1,8 +1,9 @@
 //! What arrives of a range: a number, or the level of its innovation.
 
-use super::gaussian::Predicted;
+use super::columns::Columns;
 use crate::Error;
 use crate::quantized::RangeReference;
+use fewbits_numerics::kernels::{scalar, vectorised};
 use fewbits_numerics::normal;
 
 /// Mean squared error of a normal variable of unit variance given its level: 1, 2, 3, 4 bits.
@@ -63,30 +64,48 @@ impl Arrived {
         }
     }
 
-    /// Density or probability of what arrived for a range of these moments; mean and variance of the noise-free range afterwards; and the
-    /// innovation in its own deviations, with variance one.
-    pub(super) fn right(&self, predicted: &Predicted, noise: f64) -> Result<(f64, f64, f64, f64), Error> {
-        let total = predicted.variance + noise * noise;
-        let deviation = total.sqrt();
-        let gain = predicted.variance / total;
-        let (density, mean, left, score) = match self {
-            Self::Value(value) | Self::First(value) => {
-                let score = (value - predicted.mean) / deviation;
-                (normal::pdf(score) / deviation, score, 0.0, score)
-            }
+    /// For each filter density or probability of what arrived, mean and variance of the noise-free range afterwards, and the innovation in its
+    /// own deviations, with variance one.
+    pub(super) fn right(&self, columns: &mut Columns) -> Result<(), Error> {
+        columns.extend();
+        let count = columns.mean.len();
+        let (mean, variance, total) = (&columns.mean[..count], &columns.variance[..count], &columns.total[..count]);
+        let (density, after) = (&mut columns.density[..count], &mut columns.after[..count]);
+        let (left, scores) = (&mut columns.left[..count], &mut columns.score[..count]);
+        match *self {
+            Self::Value(value) | Self::First(value) => vectorised(
+                #[inline(always)]
+                || {
+                    for k in 0..count {
+                        let deviation = total[k].sqrt();
+                        let gain = variance[k] / total[k];
+                        let score = (value - mean[k]) / deviation;
+                        density[k] = scalar::pdf(score) / deviation;
+                        after[k] = mean[k] + gain * deviation * score;
+                        left[k] = variance[k] * (1.0 - gain);
+                        scores[k] = score;
+                    }
+                },
+            ),
             Self::Level {
                 lower, upper, levels, ..
             } => {
-                // An infinite end stays infinite.
-                let edge = |edge: f64| (edge - predicted.mean) / deviation;
-                let (log_probability, mean, variance) = in_cell(edge(*lower), edge(*upper))?;
                 let bits = (levels.ilog2() as usize).clamp(1, DISTORTION.len());
-                let score = mean / (1.0 - DISTORTION[bits - 1]).sqrt();
-                (log_probability.exp(), mean, variance, score)
+                let of_score = (1.0 - DISTORTION[bits - 1]).sqrt();
+                for k in 0..count {
+                    let deviation = total[k].sqrt();
+                    let gain = variance[k] / total[k];
+                    // An infinite end stays infinite.
+                    let edge = |edge: f64| (edge - mean[k]) / deviation;
+                    let (log_probability, middle, rest) = in_cell(edge(lower), edge(upper))?;
+                    density[k] = log_probability.exp();
+                    after[k] = mean[k] + gain * deviation * middle;
+                    left[k] = variance[k] * (1.0 - gain) + variance[k] * gain * rest;
+                    scores[k] = middle / of_score;
+                }
             }
-        };
-        let after = predicted.mean + gain * deviation * mean;
-        Ok((density, after, predicted.variance * (1.0 - gain) + predicted.variance * gain * left, score))
+        }
+        Ok(())
     }
 }
 

@@ -1,22 +1,17 @@
 //! A hypothesis about the target: a bank of filters that differ in speed and noise, and how likely each anchor measures rightly.
 
-use super::arrived::Arrived;
-use super::gaussian::{Normal, Predicted, merge_into};
+use super::columns::Columns;
+use super::gaussian::{Normal, merge_into};
 use super::rest::Rest;
 use super::settings::Known;
 use super::step::Step;
 use super::walk::Walk;
-use crate::Error;
 
 /// Probability per range that the speed changes: once in a few minutes. The noise is a property of the radio and changes less often.
 const SPEED_CHANGES: f64 = 0.003;
 const NOISE_CHANGES: f64 = 0.1 * SPEED_CHANGES;
 /// Ranges between two changes: they are rare, so they are computed together.
 const MIXED: u32 = 5;
-/// Probability per range of an anchor that it starts, or ceases, to send ranges that do not depend on the distance.
-pub(super) const ANCHOR_CHANGES: f64 = 1e-3;
-/// Share of a range's score that stays in the sum of an anchor's scores.
-const SCORE_KEPT: f64 = 0.9;
 
 /// One explanation of all ranges so far.
 #[derive(Debug)]
@@ -45,13 +40,13 @@ pub(super) struct Hypothesis {
     pub(super) recent: f64,
     pub(super) behind: f64,
     /// Per anchor, the decaying sum of scores and that of their variances.
-    scores: Vec<(f64, f64)>,
+    pub(super) scores: Vec<(f64, f64)>,
     ranges: u32,
     pub(super) rest: Rest,
     /// A filter of less weight is left out.
-    negligible: f64,
+    pub(super) negligible: f64,
     /// The next range, by each filter that is not left out.
-    predicted: Vec<Predicted>,
+    pub(super) columns: Columns,
     /// A buffer.
     mixed: Vec<Mixed>,
 }
@@ -99,7 +94,7 @@ impl Clone for Hypothesis {
             ranges: self.ranges,
             rest: self.rest,
             negligible: self.negligible,
-            predicted: Vec::new(),
+            columns: Columns::default(),
             mixed: Vec::new(),
         }
     }
@@ -151,11 +146,16 @@ impl Hypothesis {
             ranges: 0,
             rest: Rest::default(),
             negligible: 0.0,
-            predicted: Vec::new(),
+            columns: Columns::default(),
             mixed: Vec::new(),
         };
         made.count_alive();
         made
+    }
+
+    /// Number of coordinates of the state.
+    pub(super) fn size(&self) -> usize {
+        self.alive.first().map_or(0, |i| self.filters[*i].mean.len())
     }
 
     fn count_alive(&mut self) {
@@ -192,9 +192,8 @@ impl Hypothesis {
 
     /// Moves all filters on, and by a displacement.
     pub(super) fn carry(&mut self, known: &Known, step: &Step, by: &[f64; 3]) {
-        let noises = known.noises.len();
         for i in &self.alive {
-            let (filter, speed) = (&mut self.filters[*i], known.speeds[i / noises]);
+            let (filter, speed) = (&mut self.filters[*i], known.bank[*i].speed);
             filter.predict(step, speed * speed);
             if let Some(walk) = &self.walk {
                 walk.carry(filter, step);
@@ -246,28 +245,30 @@ impl Hypothesis {
     /// Computes the moments of the next range of an anchor. `of_noise`: its noise as a share of the bank's. Returns its mean and variance with noise.
     pub(super) fn expect(&mut self, known: &Known, place: &[f64; 3], anchor: usize, of_noise: f64) -> (f64, f64) {
         let above = place[2] - known.level;
-        let noises = known.noises.len();
         let (mut mean, mut square) = (0.0, 0.0);
-        self.predicted
-            .resize_with(self.alive.len().max(self.predicted.len()), Predicted::default);
-        for (i, out) in self.alive.iter().zip(&mut self.predicted) {
-            let (weight, noise) = (self.weights[*i], of_noise * known.noises[i % noises]);
-            self.filters[*i].range(known.measured, place, above, anchor, out);
-            mean += weight * out.mean;
-            square += weight * (out.variance + noise * noise);
+        let size = self.size();
+        self.columns.clear(self.alive.len() * size);
+        for (k, i) in self.alive.iter().enumerate() {
+            let (weight, noise) = (self.weights[*i], of_noise * known.bank[*i].noise);
+            let cross = &mut self.columns.cross[k * size..][..size];
+            let found = self.filters[*i].range(known.measured, place, above, anchor, cross);
+            let total = found.variance + noise * noise;
+            self.columns.push(found, total);
+            mean += weight * found.mean;
+            square += weight * total;
         }
-        let between = |(i, one): (&usize, &Predicted)| self.weights[*i] * (one.mean - mean).powi(2);
-        let filters = self.alive.iter().zip(&self.predicted);
+        let between = |(i, one): (&usize, &f64)| self.weights[*i] * (one - mean).powi(2);
+        let filters = self.alive.iter().zip(&self.columns.mean);
         (mean, square + filters.map(between).sum::<f64>())
     }
 
     /// Gives all filters an unknown bias: with it the next range is as expected.
     pub(super) fn forget_bias(&mut self, known: &Known, deviation: f64, place: &[f64; 3], anchor: usize, range: f64) {
-        let mut out = Predicted::default();
+        let mut cross = vec![0.0; self.size()];
         for i in &self.alive {
             let filter = &mut self.filters[*i];
-            filter.range(known.measured, place, place[2] - known.level, anchor, &mut out);
-            let bias = filter.mean[filter.bias()] + range - out.mean;
+            let found = filter.range(known.measured, place, place[2] - known.level, anchor, &mut cross);
+            let bias = filter.mean[filter.bias()] + range - found.mean;
             filter.forget_bias(bias, deviation * deviation);
         }
     }
@@ -277,67 +278,6 @@ impl Hypothesis {
         (0..self.good.len())
             .filter(|anchor| heard(*anchor) && self.good[*anchor] > 0.5 && self.apart != Some(*anchor))
             .count()
-    }
-
-    /// Updates with what arrived from an anchor whose range was [expected](Self::expect). `holds_scale`: the error of scale is not estimated
-    /// ([`Normal::condition`]). Returns `ln` of the evidence.
-    pub(super) fn update(
-        &mut self,
-        known: &Known,
-        anchor: usize,
-        arrived: &Arrived,
-        of_noise: f64,
-        holds_scale: bool,
-    ) -> Result<f64, Error> {
-        let (noises, stray) = (known.noises.len(), arrived.stray(known.stray));
-        if matches!(arrived, Arrived::First(_)) {
-            for (i, predicted) in self.alive.iter().zip(&self.predicted) {
-                let (_, mean, variance, _) = arrived.right(predicted, of_noise * known.noises[i % noises])?;
-                self.filters[*i].condition(predicted, mean, variance, holds_scale);
-            }
-            return Ok(0.0);
-        }
-        let (good, outliers) = (self.good[anchor], known.outliers);
-        let right_share = good * (1.0 - outliers);
-        let (mut total, mut agreeing, mut score) = (0.0, 0.0, 0.0);
-        let old: f64 = self.alive.iter().map(|i| self.weights[*i]).sum();
-        for (i, predicted) in self.alive.iter().copied().zip(&self.predicted) {
-            let (density, mean, variance, innovation) =
-                arrived.right(predicted, of_noise * known.noises[i % noises])?;
-            let right = right_share * density;
-            let evidence = right + (1.0 - right_share) * stray;
-            let share = if evidence > 0.0 { right / evidence } else { 0.0 };
-            // Moments of the noise-free range under "it is no outlier" and "it is one".
-            let off = mean - predicted.mean;
-            let after = predicted.mean + share * off;
-            let spread = share * variance + (1.0 - share) * predicted.variance + share * (1.0 - share) * off * off;
-            let weight = self.weights[i] / old;
-            self.filters[i].condition(predicted, after, spread, holds_scale);
-            score += weight * innovation.clamp(-3.0, 3.0);
-            self.weights[i] = weight * evidence;
-            total += self.weights[i];
-            agreeing += weight * right;
-        }
-        if total <= 0.0 {
-            return Err(Error::Impossible);
-        }
-        let weights = &mut self.weights;
-        let largest = self.alive.iter().fold(0.0_f64, |largest, i| largest.max(weights[*i]));
-        let least = self.negligible.min(largest / total);
-        self.alive.retain(|i| {
-            let share = weights[*i] / total;
-            weights[*i] = if share < least { 0.0 } else { share };
-            weights[*i] > 0.0
-        });
-        // The anchor: with `density` the mean over the filters, `agreeing` is `good (1 - outliers) density`.
-        let still_good = (agreeing + good * outliers * stray) / total;
-        self.good[anchor] = ANCHOR_CHANGES + (1.0 - 2.0 * ANCHOR_CHANGES) * still_good.clamp(0.0, 1.0);
-        let rate = 0.5 / self.good.len() as f64;
-        self.agreement += rate * (agreeing / total - self.agreement);
-        let (sum, variance) = &mut self.scores[anchor];
-        *sum = SCORE_KEPT * *sum + score;
-        *variance = SCORE_KEPT * SCORE_KEPT * *variance + 1.0;
-        Ok(total.ln())
     }
 
     /// How much the scores of all anchors differ from independent ones of mean zero, in standard deviations of the sum of their squares
@@ -369,10 +309,10 @@ impl Hypothesis {
             for ((off, mean), i) in off.iter_mut().zip(&mean).zip(coordinates) {
                 *off = part.mean[*i] - mean;
             }
-            for (a, i) in coordinates.iter().enumerate() {
-                let row = &part.covariance[i * n..(i + 1) * n];
-                for (b, j) in coordinates.iter().enumerate().take(a + 1) {
-                    covariance[a][b] += share * (row[*j] + off[a] * off[b]);
+            for a in 0..N {
+                let row = &part.covariance[coordinates[a] * n..][..n];
+                for b in 0..=a {
+                    covariance[a][b] += share * (row[coordinates[b]] + off[a] * off[b]);
                 }
             }
         }

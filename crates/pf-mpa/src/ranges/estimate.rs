@@ -1,9 +1,9 @@
 //! What all hypotheses together say.
 
+use super::band::Laws;
 use super::bank::Hypothesis;
 use super::odds::shares_of;
 use super::settings::Known;
-use fewbits_numerics::normal;
 use nalgebra::{Matrix3, Vector3};
 
 /// Hypotheses of less than this share are no second place.
@@ -16,14 +16,6 @@ const APART: f64 = 3.0;
 const IMPROBABLE: [f64; 2] = [10.828, 13.816];
 /// A share of the prior's variance that the ranges must have taken off before they can contradict it.
 const TOLD: f64 = 0.05;
-/// Deviations to either side of a mean that hold 95 % of a normal law.
-const BAND: f64 = 1.959_963_984_540_054;
-
-/// Steps to the end of a band at most, and by how much the probability beside it may be off.
-const STEPS: usize = 60;
-const CLOSE: f64 = 1e-6;
-/// So many deviations beyond its mean a law is as good as over.
-const FAR: f64 = 6.0;
 
 /// The estimate after one range. Lengths are in the unit of the anchors' coordinates.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,7 +87,7 @@ impl Part {
 
 /// The estimate of all hypotheses together; `None` without any.
 pub(super) fn of(known: &Known, hypotheses: &[Hypothesis], lost: bool) -> Option<RangeEstimate> {
-    let (axes, noises) = (known.axes, known.noises.len());
+    let axes = known.axes;
     let shares = shares_of(hypotheses);
     let parts: Vec<Part> = shares
         .iter()
@@ -114,6 +106,7 @@ pub(super) fn of(known: &Known, hypotheses: &[Hypothesis], lost: bool) -> Option
     let mut position = Vector3::new(0.0, 0.0, known.level);
     (0..axes).for_each(|i| position[i] = mean(i));
     let mut covariance = Matrix3::zeros();
+    let mut laws = Laws::default();
     let mut bands = [(known.level, known.level); 3];
     for i in 0..axes {
         for j in 0..axes {
@@ -122,9 +115,11 @@ pub(super) fn of(known: &Known, hypotheses: &[Hypothesis], lost: bool) -> Option
             };
             covariance[(i, j)] = parts.iter().map(one).sum();
         }
-        let law = |one: &Part| (one.share, one.mean[i], one.covariance[i][i].sqrt());
-        let laws: Vec<(f64, f64, f64)> = parts.iter().filter(|one| one.share > FAINT).map(law).collect();
-        bands[i] = band(&laws);
+        laws.clear();
+        for one in parts.iter().filter(|one| one.share > FAINT) {
+            laws.push(one.share, one.mean[i], one.covariance[i][i].sqrt());
+        }
+        bands[i] = laws.band();
     }
     let others = parts
         .iter()
@@ -134,8 +129,8 @@ pub(super) fn of(known: &Known, hypotheses: &[Hypothesis], lost: bool) -> Option
     for (share, one) in shares.iter().zip(hypotheses) {
         for i in &one.alive {
             let weight = one.weights[*i];
-            noise += share * weight * known.log_noises[i % noises];
-            speed += share * weight * known.log_speeds[i / noises];
+            noise += share * weight * known.bank[*i].log_noise;
+            speed += share * weight * known.bank[*i].log_speed;
         }
     }
     Some(RangeEstimate {
@@ -160,13 +155,16 @@ fn is_doubtful(known: &Known, parts: &[Part]) -> bool {
     }
     let priors = [(BIAS, known.bias), (SCALE, known.scale)];
     let asked: Vec<(usize, f64)> = priors.into_iter().filter(|(_, prior)| *prior > 0.0).collect();
-    let mean = |i: usize| parts.iter().map(|one| one.share * one.mean[i]).sum::<f64>();
+    let mut means = [0.0; 5];
+    for i in [BIAS, SCALE] {
+        means[i] = parts.iter().map(|one| one.share * one.mean[i]).sum();
+    }
     // In deviations of the priors.
     let covariance = |(i, of_i): (usize, f64), (j, of_j): (usize, f64)| {
-        let one = |one: &Part| one.share * (one.covariance[i][j] + (one.mean[i] - mean(i)) * (one.mean[j] - mean(j)));
+        let one = |one: &Part| one.share * (one.covariance[i][j] + (one.mean[i] - means[i]) * (one.mean[j] - means[j]));
         parts.iter().map(one).sum::<f64>() / (of_i * of_j)
     };
-    let off = |(i, of): (usize, f64)| mean(i) / of;
+    let off = |(i, of): (usize, f64)| means[i] / of;
     // One of the two alone, where the ranges tell of the other nothing.
     let is_far = |one: (usize, f64)| {
         let left = 1.0 - covariance(one, one);
@@ -192,59 +190,4 @@ fn is_doubtful(known: &Known, parts: &[Part]) -> bool {
 fn are_apart(a: &Part, b: &Part, axes: usize) -> bool {
     let deviation = |one: &Part, i: usize| one.covariance[i][i].sqrt();
     (0..axes).any(|i| (a.mean[i] - b.mean[i]).abs() > APART * (deviation(a, i) + deviation(b, i)))
-}
-
-/// The interval that holds 95 % of a mixture of `(share, mean, deviation)`, with 2.5 % on either side.
-fn band(laws: &[(f64, f64, f64)]) -> (f64, f64) {
-    (end(laws, -BAND, 0.025), end(laws, BAND, 0.975))
-}
-
-/// Where the probability below reaches `target`, by Halley's steps between ends that hold it. `off`: the place for one law, in deviations.
-fn end(laws: &[(f64, f64, f64)], off: f64, target: f64) -> f64 {
-    let ends = laws.iter().map(|(_, mean, deviation)| mean + off * deviation);
-    let (mut low, mut high) =
-        ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), end| (low.min(end), high.max(end)));
-    if laws.len() == 1 {
-        return low;
-    }
-    // The end of the normal law with the mixture's moments is near.
-    let mean: f64 = laws.iter().map(|(share, mean, _)| share * mean).sum();
-    let variance =
-        |(share, centre, deviation): &(f64, f64, f64)| share * (deviation * deviation + (centre - mean).powi(2));
-    let mut x = (mean + off * laws.iter().map(variance).sum::<f64>().sqrt()).clamp(low, high);
-    for _ in 0..STEPS {
-        let (mut below, mut density, mut slope) = (0.0, 0.0, 0.0);
-        for (share, mean, deviation) in laws {
-            let z = (x - mean) / deviation;
-            if z.abs() > FAR {
-                below += if z > 0.0 { *share } else { 0.0 };
-                continue;
-            }
-            // A law without a deviation, at its mean.
-            below += share * if z.is_nan() { 0.5 } else { normal::cdf(z) };
-            if *deviation > 0.0 {
-                let own = share * normal::pdf(z) / deviation;
-                density += own;
-                slope -= own * z / deviation;
-            }
-        }
-        let error = below - target;
-        if error.abs() < CLOSE || low >= high {
-            break;
-        }
-        if error < 0.0 {
-            low = x
-        } else {
-            high = x
-        }
-        let newton = error / density;
-        let bend = 1.0 - 0.5 * newton * slope / density;
-        let step = x - newton / bend.clamp(0.5, 2.0);
-        x = if step > low && step < high {
-            step
-        } else {
-            0.5 * (low + high)
-        };
-    }
-    x
 }

@@ -7,9 +7,11 @@
 //! ```
 
 use super::gaussian::Normal;
+use super::own::Own;
 use super::root::root;
 use super::rows::{Collected, Rows};
-use super::settings::{Known, Own};
+use super::settings::Known;
+use smallvec::SmallVec;
 
 /// What is known of bias and scale: mean and variance of each.
 pub(super) type Calibration = [(f64, f64); 2];
@@ -343,7 +345,7 @@ fn law<const S: usize>(problem: &Problem<'_, S>, x: &Vector<S>, factor: &Matrix<
         let deviation = own.deviation();
         (first..n).for_each(|i| covariance[i * n + i] = deviation * deviation);
         // Given the state, the bias of an anchor is a share of what its range is off.
-        let shares: Vec<(usize, f64, Vector<S>)> = problem
+        let shares: SmallVec<[(usize, f64, Vector<S>); 8]> = problem
             .rows
             .ranges
             .iter()

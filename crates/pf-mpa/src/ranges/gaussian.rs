@@ -38,12 +38,11 @@ pub(super) struct Normal {
     pub(super) only: Option<usize>,
 }
 
-/// Moments of one noise-free range: mean, variance, and covariance with the state.
-#[derive(Debug, Clone, Default)]
+/// Moments of one noise-free range. Its covariance with the state stands in a buffer beside.
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Predicted {
     pub(super) mean: f64,
     pub(super) variance: f64,
-    pub(super) cross: Vec<f64>,
 }
 
 impl Clone for Normal {
@@ -104,10 +103,20 @@ impl Normal {
 
     /// Whether means and variances are finite, and no variance is negative.
     pub(super) fn is_finite(&self) -> bool {
-        let variances = self.covariance.iter().step_by(self.mean.len() + 1);
+        of_size!(self.is_finite_of())
+    }
+
+    fn is_finite_of<const N: usize, const AXES: usize>(&self) -> bool {
+        let n = if N > 0 { N } else { self.mean.len() };
+        let (means, covariance) = (&self.mean[..n], &self.covariance[..n * n]);
         // `0 x` is zero for finite numbers only, and a sum needs no branch per number.
-        let rest: f64 = self.mean.iter().chain(variances.clone()).map(|x| 0.0 * x).sum();
-        rest == 0.0 && variances.fold(0.0_f64, |least, variance| least.min(*variance)) >= 0.0
+        let (mut rest, mut least) = (0.0, 0.0_f64);
+        for i in 0..n {
+            let variance = covariance[i * n + i];
+            rest += 0.0 * means[i] + 0.0 * variance;
+            least = if variance < least { variance } else { least };
+        }
+        rest == 0.0 && least >= 0.0
     }
 
     /// Moves the state by a step whose velocities have this variance.
@@ -166,8 +175,16 @@ impl Normal {
     }
 
     /// Moments of the noise-free range to an anchor. `place`: its coordinates. `above`: what it is higher than the target if heights are known.
-    pub(super) fn range(&self, measured: Measured, place: &[f64; 3], above: f64, anchor: usize, out: &mut Predicted) {
-        of_size!(self.range_of(measured, place, above, anchor, out));
+    /// `cross` gets its covariance with the state, a number for each coordinate.
+    pub(super) fn range(
+        &self,
+        measured: Measured,
+        place: &[f64; 3],
+        above: f64,
+        anchor: usize,
+        cross: &mut [f64],
+    ) -> Predicted {
+        of_size!(self.range_of(measured, place, above, anchor, cross))
     }
 
     fn range_of<const N: usize, const AXES: usize>(
@@ -176,8 +193,8 @@ impl Normal {
         place: &[f64; 3],
         above: f64,
         anchor: usize,
-        out: &mut Predicted,
-    ) {
+        cross: &mut [f64],
+    ) -> Predicted {
         let n = if N > 0 { N } else { self.mean.len() };
         let (axes, bias, scale) = (AXES, 2 * AXES, 2 * AXES + 1);
         let (means, covariance) = (&self.mean[..n], &self.covariance[..n * n]);
@@ -228,12 +245,10 @@ impl Normal {
             (0..axes).for_each(|i| gradient[i] = slope * ((at[i] - place[i]) / far));
         }
         let factor = 1.0 + means[scale];
-        out.mean = factor * mean + means[bias];
         let own = self.own(anchor);
-        out.mean += own.map_or(0.0, |own| means[own]);
+        let expected = factor * mean + means[bias] + own.map_or(0.0, |own| means[own]);
         // The covariance is symmetric: a sum of rows, by what each coordinate does to the range.
-        out.cross.resize(n, 0.0);
-        let cross = &mut out.cross[..n];
+        let cross = &mut cross[..n];
         let row = |i: usize| &covariance[i * n..(i + 1) * n];
         let (first, second) = (factor * gradient[0], factor * gradient[1]);
         let (x, y, biases, scales) = (row(0), row(1), row(bias), row(scale));
@@ -252,29 +267,37 @@ impl Normal {
         // Variance of the position along the gradient.
         let along = |i: usize| -> f64 { (0..axes).map(|j| covariance[i * n + j] * gradient[j]).sum() };
         let explained = (0..axes).map(|i| along(i) * gradient[i]).sum::<f64>().max(0.0);
-        out.variance = linear.max(0.0) + factor * factor * rest + scales[scale] * (rest + explained);
+        Predicted {
+            mean: expected,
+            variance: linear.max(0.0) + factor * factor * rest + scales[scale] * (rest + explained),
+        }
     }
 
     /// Conditions on a range whose noise-free value has this mean and variance afterwards. `holds_scale`: mean and variance of the error of
     /// scale stay as they are, and what it does to the other coordinates is kept in its covariances with them (a filter with a considered
     /// parameter, Schmidt 1966). So a direction in which the ranges say nothing is not taken for known because the range is linearised at
     /// another place each time.
-    pub(super) fn condition(&mut self, predicted: &Predicted, mean: f64, variance: f64, holds_scale: bool) {
+    pub(super) fn condition(
+        &mut self,
+        (predicted, cross): (Predicted, &[f64]),
+        (mean, variance): (f64, f64),
+        holds_scale: bool,
+    ) {
         if predicted.variance > 0.0 {
-            of_size!(self.condition_of(predicted, mean, variance, holds_scale));
+            of_size!(self.condition_of((predicted, cross), mean, variance, holds_scale));
         }
     }
 
     fn condition_of<const N: usize, const AXES: usize>(
         &mut self,
-        predicted: &Predicted,
+        (predicted, cross): (Predicted, &[f64]),
         mean: f64,
         variance: f64,
         holds_scale: bool,
     ) {
         let n = if N > 0 { N } else { self.mean.len() };
         let scale = 2 * AXES + 1;
-        let (means, covariance, cross) = (&mut self.mean[..n], &mut self.covariance[..n * n], &predicted.cross[..n]);
+        let (means, covariance, cross) = (&mut self.mean[..n], &mut self.covariance[..n * n], &cross[..n]);
         let shift = (mean - predicted.mean) / predicted.variance;
         let shrink = (predicted.variance - variance) / (predicted.variance * predicted.variance);
         let held = (means[scale], covariance[scale * n + scale]);
@@ -307,6 +330,21 @@ impl Normal {
     }
 }
 
+impl Normal {
+    /// Adds to the covariance what a part of a mixture with this mean has in it.
+    fn add_part<const N: usize, const AXES: usize>(&mut self, share: f64, part: &Self) {
+        let n = if N > 0 { N } else { self.mean.len() };
+        let (means, centre) = (&part.mean[..n], &self.mean[..n]);
+        let (sums, rows) = (&mut self.covariance[..n * n], &part.covariance[..n * n]);
+        for (i, (sums, row)) in sums.chunks_exact_mut(n).zip(rows.chunks_exact(n)).enumerate() {
+            let between = share * (means[i] - centre[i]);
+            for j in 0..n {
+                sums[j] += share * row[j] + between * (means[j] - centre[j]);
+            }
+        }
+    }
+}
+
 /// The normal law with the moments of a mixture. Weights need not sum to one. Returns whether there is such a law: not if they sum to zero.
 pub(super) fn merge_into<'a>(parts: impl Iterator<Item = (f64, &'a Normal)> + Clone, out: &mut Normal) -> bool {
     let total: f64 = parts.clone().map(|(weight, _)| weight).sum();
@@ -327,19 +365,7 @@ pub(super) fn merge_into<'a>(parts: impl Iterator<Item = (f64, &'a Normal)> + Cl
             .for_each(|(sum, x)| *sum += share * x);
     }
     for (weight, part) in parts {
-        let share = weight / total;
-        let (means, centre) = (&part.mean[..n], &out.mean[..n]);
-        for (i, (sums, row)) in out
-            .covariance
-            .chunks_exact_mut(n)
-            .zip(part.covariance.chunks_exact(n))
-            .enumerate()
-        {
-            let between = share * (means[i] - centre[i]);
-            for (((sum, x), own), mean) in sums.iter_mut().zip(row).zip(means).zip(centre) {
-                *sum += share * x + between * (own - mean);
-            }
-        }
+        of_size!(out.add_part(weight / total, part));
     }
     true
 }
@@ -362,12 +388,12 @@ mod tests {
         for (i, variance) in [1.0, 1.0, 0.1, 0.1, 0.5, 0.01].into_iter().enumerate() {
             normal.covariance[i * n + i] = variance;
         }
-        let mut predicted = Predicted::default();
+        let mut cross = [0.0; 6];
         for k in 0..60_i32 {
             let place = [10.0 * f64::from(k % 3), 7.0 * f64::from(k % 2), 0.0];
-            normal.range(Measured::Distance, &place, 0.0, 0, &mut predicted);
+            let predicted = normal.range(Measured::Distance, &place, 0.0, 0, &mut cross);
             let factor = if k % 4 == 3 { 3.0 } else { 0.3 };
-            normal.condition(&predicted, predicted.mean, factor * predicted.variance, true);
+            normal.condition((predicted, &cross), (predicted.mean, factor * predicted.variance), true);
             let scale = 5;
             for i in (0..n).filter(|i| *i != scale) {
                 let cross = normal.covariance[i * n + scale];

@@ -3,6 +3,7 @@
 use super::fit::{Calibration, Search};
 use super::rows::Collected;
 use super::settings::Known;
+use fewbits_numerics::kernels::{scalar, vectorised};
 
 /// Nodes to either side of the middle, and from one to the next in deviations of the prior, for two coordinates and for three.
 const NODES: [(i32, f64); 2] = [(12, 0.25), (6, 0.4)];
@@ -22,20 +23,22 @@ pub(super) struct Grid<'a> {
     priors: Vec<f64>,
     /// Range by range, for each the points.
     measured: Vec<Vec<f64>>,
-    /// Point by point, sums over all ranges.
-    sums: Vec<Sums>,
+    /// Sums over all ranges.
+    sums: Sums,
+    /// What is measured where no range is left out.
+    nothing: Vec<f64>,
     /// The middle of the ranges.
     centre: f64,
     /// Variance of a range's error on the grid.
     variance: f64,
 }
 
-/// Sums over ranges at a point: of what is measured there, of its squares, and of its products with the ranges about their middle.
-#[derive(Clone, Copy, Default)]
+/// Sums over ranges at each point: of what is measured there, of its squares, and of its products with the ranges about their middle.
+#[derive(Clone, Default)]
 struct Sums {
-    distances: f64,
-    squares: f64,
-    products: f64,
+    distances: Vec<f64>,
+    squares: Vec<f64>,
+    products: Vec<f64>,
 }
 
 impl<'a> Grid<'a> {
@@ -61,12 +64,17 @@ impl<'a> Grid<'a> {
         let of = |one: &Collected| points.iter().map(|point| search.measured(point, one)).collect();
         let measured: Vec<Vec<f64>> = ranges.iter().map(of).collect();
         let centre = ranges.iter().map(|one| one.range).sum::<f64>() / ranges.len().max(1) as f64;
-        let mut sums = vec![Sums::default(); points.len()];
+        let nothing = vec![0.0; points.len()];
+        let mut sums = Sums {
+            distances: nothing.clone(),
+            squares: nothing.clone(),
+            products: nothing.clone(),
+        };
         for (one, measured) in ranges.iter().zip(&measured) {
-            for (sums, d) in sums.iter_mut().zip(measured) {
-                sums.distances += d;
-                sums.squares += d * d;
-                sums.products += (one.range - centre) * d;
+            for (point, d) in measured.iter().enumerate() {
+                sums.distances[point] += d;
+                sums.squares[point] += d * d;
+                sums.products[point] += (one.range - centre) * d;
             }
         }
         // Half a step: between two nodes the likelihood must not vanish.
@@ -75,6 +83,7 @@ impl<'a> Grid<'a> {
         Self {
             measured,
             sums,
+            nothing,
             centre,
             known,
             ranges,
@@ -93,6 +102,7 @@ impl<'a> Grid<'a> {
         let factor = 1.0 + scale;
         let own =
             without.and_then(|number| Some((self.ranges.get(number)?.range - self.centre, &self.measured[number])));
+        let (range, measured) = own.unwrap_or((0.0, &self.nothing));
         let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
         for (_, one) in self
             .ranges
@@ -106,37 +116,41 @@ impl<'a> Grid<'a> {
         }
         // What the mean bias adds to the products of ranges about their middle and distances.
         let beyond = self.centre - bias;
-        let value = |(point, (prior, sums)): (usize, (&f64, &Sums))| {
-            let mut sums = *sums;
-            if let Some((range, measured)) = own {
-                let d = measured[point];
-                sums = Sums {
-                    distances: sums.distances - d,
-                    squares: sums.squares - d * d,
-                    products: sums.products - range * d,
-                };
-            }
-            let products = sums.products + beyond * sums.distances;
-            // Sums of what ranges are off at the means of bias and scale: of squares, alone, and times the distance.
-            let off = [
-                squares - factor * (2.0 * products - factor * sums.squares),
-                sum - factor * sums.distances,
-                products - factor * sums.squares,
-            ];
-            // Information about bias and scale in their deviations, of which the prior is one each.
-            let information = [
-                1.0 + bias_variance * relative * count,
-                relative * sums.distances,
-                1.0 + scale_variance * relative * sums.squares,
-            ];
-            let both = bias_variance * scale_variance * information[1] * information[1];
-            let determinant = information[0] * information[2] - both;
-            let explained = bias_variance * off[1] * off[1] * information[2]
-                + scale_variance * off[2] * off[2] * information[0]
-                - 2.0 * bias_variance * scale_variance * off[1] * off[2] * information[1];
-            -prior - 0.5 * (relative * (off[0] - relative * explained / determinant) + f64::ln(determinant))
-        };
-        self.priors.iter().zip(&self.sums).enumerate().map(value).collect()
+        let points = self.points.len();
+        let (priors, measured) = (&self.priors[..points], &measured[..points]);
+        let (distances, all_squares) = (&self.sums.distances[..points], &self.sums.squares[..points]);
+        let all_products = &self.sums.products[..points];
+        let mut values = vec![0.0; points];
+        vectorised(
+            #[inline(always)]
+            || {
+                for (point, found) in values.iter_mut().enumerate() {
+                    let d = measured[point];
+                    let (distances, squares_of_distances) = (distances[point] - d, all_squares[point] - d * d);
+                    let products = all_products[point] - range * d + beyond * distances;
+                    // Sums of what ranges are off at the means of bias and scale: of squares, alone, and times the distance.
+                    let off = [
+                        squares - factor * (2.0 * products - factor * squares_of_distances),
+                        sum - factor * distances,
+                        products - factor * squares_of_distances,
+                    ];
+                    // Information about bias and scale in their deviations, of which the prior is one each.
+                    let information = [
+                        1.0 + bias_variance * relative * count,
+                        relative * distances,
+                        1.0 + scale_variance * relative * squares_of_distances,
+                    ];
+                    let both = bias_variance * scale_variance * information[1] * information[1];
+                    let determinant = information[0] * information[2] - both;
+                    let explained = bias_variance * off[1] * off[1] * information[2]
+                        + scale_variance * off[2] * off[2] * information[0]
+                        - 2.0 * bias_variance * scale_variance * off[1] * off[2] * information[1];
+                    *found = -priors[point]
+                        - 0.5 * (relative * (off[0] - relative * explained / determinant) + scalar::ln(determinant));
+                }
+            },
+        );
+        values
     }
 
     /// Local maxima of the density of positions, given all ranges or all but one, the best first.

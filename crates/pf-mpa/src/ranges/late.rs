@@ -3,8 +3,10 @@
 //! The first range of a little lateness may be one that the target has moved, and what is taken for that moves the place, so that good anchors
 //! contradict it afterwards. So a range that is longer than expected also begins a hypothesis in which it says nothing, until the next ranges decide.
 
-use super::bank::{ANCHOR_CHANGES, Hypothesis};
+use super::bank::Hypothesis;
 use super::settings::Known;
+use super::spare::Spare;
+use super::update::ANCHOR_CHANGES;
 
 /// A range is suspect from so many deviations above the expected one.
 const SUSPECT: f64 = 1.0;
@@ -22,9 +24,9 @@ pub(super) fn with_late(
     hypotheses: &[Hypothesis],
     expectations: &[(f64, f64)],
     shares: &[f64],
-    anchor: usize,
-    range: f64,
+    (anchor, range): (usize, f64),
     has_enough: impl Fn(&Hypothesis) -> bool,
+    spare: &mut Spare,
 ) -> Vec<Hypothesis> {
     let mut found = Vec::new();
     let mean = LATENESS * known.size;
@@ -34,7 +36,7 @@ pub(super) fn with_late(
         let is_asked = *share > PROBABLE && hypotheses.len() + found.len() < MOST;
         if is_suspect && is_asked && one.good[anchor] > 0.5 && one.apart != Some(anchor) && has_enough(one) {
             let log_density = BEGINS.ln() - mean.ln() - off / mean;
-            let mut late = one.clone();
+            let mut late = spare.copy(one);
             late.good[anchor] = ANCHOR_CHANGES;
             late.weigh(log_density);
             found.push(late);

@@ -19,7 +19,9 @@ mod acquisition;
 mod again;
 mod arrived;
 mod asked;
+mod band;
 mod bank;
+mod columns;
 mod estimate;
 mod fit;
 mod gaussian;
@@ -29,10 +31,12 @@ mod heights;
 mod late;
 mod line;
 mod measured;
+mod members;
 mod mirror;
 mod mistakes;
 mod moved;
 mod odds;
+mod own;
 mod push;
 mod residuals;
 mod rest;
@@ -40,7 +44,9 @@ mod root;
 mod rows;
 mod search;
 mod settings;
+mod spare;
 mod step;
+mod update;
 mod walk;
 mod walking;
 
@@ -67,6 +73,7 @@ use odds::{ASIDE, count_contradictions, drop_improbable, is_lost, merge_same, sh
 use residuals::Residuals;
 use rows::Latest;
 use settings::{Known, NEEDLESS_OF_LEVELS, NEGLIGIBLE_OF_LEVELS};
+use spare::Spare;
 use std::collections::BTreeMap;
 use step::Step;
 use walking::with_walks;
@@ -95,8 +102,9 @@ pub struct RangeTracker {
     loading: f64,
     known: Known,
     hypotheses: Vec<Hypothesis>,
-    /// A buffer: the next hypotheses while they are computed.
-    next: Vec<Hypothesis>,
+    spare: Spare,
+    /// The estimate of the hypotheses.
+    latest: Option<RangeEstimate>,
     /// When each anchor last sent a range.
     heard: Vec<f64>,
     /// The latest range in full of each anchor.
@@ -158,7 +166,8 @@ impl RangeTracker {
             travel,
             loading,
             hypotheses: Vec::new(),
-            next: Vec::new(),
+            latest: None,
+            spare: Spare::default(),
             heard: vec![f64::NEG_INFINITY; places.len()],
             collected: BTreeMap::new(),
             tried: 0,
@@ -207,11 +216,14 @@ impl RangeTracker {
             self.bits += FULL_BITS;
             self.search(time, is_new, anchor, Latest::new(time, f64::from(range as f32), share));
             self.last = time;
-            return Ok(self.estimate(false));
+            self.latest = self.estimate(false);
+            return Ok(self.latest.clone());
         }
-        let mut next = std::mem::take(&mut self.next);
-        next.clone_from(&self.hypotheses);
-        let lost = match self.track(&mut next, time - self.at, is_new, anchor, (range, share)) {
+        let mut next = std::mem::take(&mut self.hypotheses);
+        let mut spare = std::mem::take(&mut self.spare);
+        let tracked = self.track((&mut next, &mut spare), time - self.at, is_new, anchor, (range, share));
+        self.spare = spare;
+        let lost = match tracked {
             Ok((taken, residual, deviation)) => {
                 self.evidence += taken;
                 if self.travel == Travel::Full && (self.known.clock.is_none() || !is_new) {
@@ -224,9 +236,11 @@ impl RangeTracker {
                 }
                 is_lost(&next, self.travel != Travel::Full)
             }
-            // The range has probability zero under every hypothesis, even as an outlier.
-            Err(Error::Impossible) => true,
-            Err(error) => return Err(error),
+            // The range has probability zero under every hypothesis, even as an outlier: none is left.
+            Err(_) => {
+                next.clear();
+                true
+            }
         };
         (self.last, self.at) = (time, time);
         self.bits += match self.travel {
@@ -240,11 +254,11 @@ impl RangeTracker {
             self.collected
                 .insert(anchor, Latest::new(time, f64::from(range as f32), share));
         }
-        if !next.is_empty() {
-            std::mem::swap(&mut self.hypotheses, &mut next);
-        }
-        self.next = next;
-        let estimate = self.estimate(lost);
+        self.hypotheses = next;
+        // Without a hypothesis the estimate is the one before.
+        let before = self.latest.take().map(|latest| RangeEstimate { lost, ..latest });
+        self.latest = self.estimate(lost).or(before);
+        let estimate = self.latest.clone();
         if lost {
             self.losses += 1;
             self.forget();
@@ -252,43 +266,11 @@ impl RangeTracker {
         Ok(estimate)
     }
 
-    /// Collects a range, and looks for places once there are enough.
-    fn search(&mut self, time: f64, is_new: bool, anchor: usize, found: Latest) {
-        let least = self.known.axes + 1;
-        if self.known.clock.is_some() && is_new {
-            // The ranges of one time are complete.
-            if self.collected.len() >= least {
-                self.acquire(self.last);
-            }
-            self.collected.clear();
-            if !self.hypotheses.is_empty() {
-                let mut next = self.hypotheses.clone();
-                if let Ok((taken, ..)) = self.track(&mut next, time - self.at, true, anchor, (found.range, found.share))
-                {
-                    self.hypotheses = next;
-                    self.at = time;
-                    self.evidence += taken;
-                }
-                return;
-            }
-        }
-        let silence = self.known.silence;
-        self.collected.retain(|_, latest| time - latest.time <= silence);
-        self.collected.insert(anchor, found);
-        self.tried += 1;
-        // An anchor that never answers is not waited for.
-        let is_enough = self.collected.len() >= self.needed();
-        let has_waited = self.collected.len() >= least && self.tried >= 2 * self.places.len();
-        if is_enough || has_waited && self.known.clock.is_none() {
-            self.acquire(time);
-        }
-    }
-
     /// Moves hypotheses on and updates them with a range. Returns `ln` of the evidence that was taken off their weights, and the range's residual in
     /// its predicted deviation, and that.
     fn track(
         &self,
-        next: &mut Vec<Hypothesis>,
+        (next, spare): (&mut Vec<Hypothesis>, &mut Spare),
         elapsed: f64,
         is_new: bool,
         anchor: usize,
@@ -326,8 +308,7 @@ impl RangeTracker {
                         .zip(&shares)
                         .map(|(one, share)| share * (1.0 - one.good[anchor]))
                         .sum();
-                    let size =
-                        uncertainty_of_noise(&known.log_noises, next, &shares).max(ASIDE * doubt) * variance.sqrt();
+                    let size = uncertainty_of_noise(&known.bank, next, &shares).max(ASIDE * doubt) * variance.sqrt();
                     if is_above { size } else { -size }
                 } else {
                     0.0
@@ -348,14 +329,14 @@ impl RangeTracker {
         let is_undecided = next.iter().all(is_short);
         let enough = |one: &Hypothesis| one.usable(|other| last - heard[other] <= known.silence) > known.axes + 1;
         let mut late = match arrived {
-            Arrived::Value(value) => with_late(known, next, &expectations, &shares, anchor, value, enough),
+            Arrived::Value(value) => with_late(known, next, &expectations, &shares, (anchor, value), enough, spare),
             _ => Vec::new(),
         };
         let mut evidences: Vec<(bool, f64)> = Vec::with_capacity(next.len());
-        next.retain_mut(|one| {
+        spare.retain(next, |one| {
             let short = is_short(one);
             let holds_scale = one.rests(known, short) || (!one.is_cut && short);
-            match one.update(known, anchor, &arrived, of_noise, holds_scale) {
+            match one.update(known, anchor, &arrived, holds_scale) {
                 Ok(log_evidence) if one.is_finite() => {
                     evidences.push((is_undecided || short && one.apart.is_some(), log_evidence));
                     true
@@ -374,14 +355,14 @@ impl RangeTracker {
         // One anchor that is apart and others that contradict: an explanation that leaves too few anchors for a place is none beside others.
         let is_enough = |one: &Hypothesis| one.apart.is_none() || one.contradicted == 0;
         if next.iter().any(is_enough) {
-            next.retain(is_enough);
+            spare.retain(next, |one| is_enough(one));
         }
         if next.is_empty() {
             return Err(failed.unwrap_or(Error::Impossible));
         }
-        let taken = drop_improbable(next, known.negligible);
+        let taken = drop_improbable(next, known.negligible, spare);
         if self.pushed.is_multiple_of(COMPARED) {
-            merge_same(next, known.axes);
+            merge_same(next, known.axes, spare);
             let is_carried = self.collected.values().any(|latest| latest.moved != [0.0; 3]);
             add_mirrored(known, next, is_carried);
         }

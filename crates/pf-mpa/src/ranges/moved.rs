@@ -49,7 +49,8 @@ impl RangeTracker {
         for latest in self.collected.values_mut() {
             latest.moved.iter_mut().zip(&whole).for_each(|(sum, x)| *sum += x);
         }
-        Ok(self.estimate(false))
+        self.latest = self.estimate(false);
+        Ok(self.latest.clone())
     }
 }
 

@@ -2,6 +2,8 @@
 
 use super::bank::Hypothesis;
 use super::fit::Calibration;
+use super::members::Member;
+use super::spare::Spare;
 
 /// A hypothesis whose probability is less than this share of the best one's is dropped in any case.
 const LEAST: f64 = 1e-5;
@@ -122,12 +124,12 @@ pub(super) fn is_worth(log_ratio: f64, negligible: f64) -> bool {
 }
 
 /// Drops hypotheses that are improbable beside the best one. Returns what was taken off the `ln` of all weights: only differences matter.
-pub(super) fn drop_improbable(hypotheses: &mut Vec<Hypothesis>, negligible: f64) -> f64 {
+pub(super) fn drop_improbable(hypotheses: &mut Vec<Hypothesis>, negligible: f64, spare: &mut Spare) -> f64 {
     let best = hypotheses
         .iter()
         .map(Hypothesis::log_share)
         .fold(f64::NEG_INFINITY, f64::max);
-    hypotheses.retain(|one| is_worth(one.log_share() - best, negligible));
+    spare.retain(hypotheses, |one| is_worth(one.log_share() - best, negligible));
     if !best.is_finite() {
         return 0.0;
     }
@@ -136,7 +138,7 @@ pub(super) fn drop_improbable(hypotheses: &mut Vec<Hypothesis>, negligible: f64)
 }
 
 /// Of hypotheses about the same place with the same model, keeps the most probable, with the probability of all.
-pub(super) fn merge_same(hypotheses: &mut Vec<Hypothesis>, axes: usize) {
+pub(super) fn merge_same(hypotheses: &mut Vec<Hypothesis>, axes: usize, spare: &mut Spare) {
     if hypotheses.len() < 2 {
         return;
     }
@@ -159,7 +161,7 @@ pub(super) fn merge_same(hypotheses: &mut Vec<Hypothesis>, axes: usize) {
             None => kept.push(i),
         }
     }
-    hypotheses.retain_mut(|one| {
+    spare.retain(hypotheses, |one| {
         one.log_weight += gained[number];
         number += 1;
         kept.contains(&(number - 1))
@@ -203,11 +205,11 @@ pub(super) fn is_lost(hypotheses: &[Hypothesis], are_levels: bool) -> bool {
 }
 
 /// The deviation of `ln` of the noise over all filters, at most [`ASIDE`].
-pub(super) fn uncertainty_of_noise(log_noises: &[f64], hypotheses: &[Hypothesis], shares: &[f64]) -> f64 {
+pub(super) fn uncertainty_of_noise(bank: &[Member], hypotheses: &[Hypothesis], shares: &[f64]) -> f64 {
     let (mut mean, mut square) = (0.0, 0.0);
     for (one, share) in hypotheses.iter().zip(shares) {
         for i in &one.alive {
-            let (weight, log) = (one.weights[*i], log_noises[i % log_noises.len()]);
+            let (weight, log) = (one.weights[*i], bank[*i].log_noise);
             mean += share * weight * log;
             square += share * weight * log * log;
         }

@@ -1,7 +1,8 @@
 //! Ranges that a place must explain.
 
 use super::measured::Measured;
-use super::settings::Own;
+use super::own::Own;
+use smallvec::SmallVec;
 
 /// The latest range of an anchor.
 #[derive(Debug, Clone, Copy)]
@@ -62,10 +63,13 @@ pub(super) struct Slice {
     pub(super) deviation: f64,
 }
 
+/// Of so many ranges the variances need no allocation.
+const FEW: usize = 8;
+
 /// Ranges with their errors' variances, the biases of their anchors included.
 pub(super) struct Rows<'a> {
     pub(super) ranges: &'a [Collected],
-    pub(super) variances: Vec<f64>,
+    pub(super) variances: SmallVec<[f64; FEW]>,
     pub(super) slice: Option<Slice>,
 }
 

@@ -2,8 +2,8 @@
 
 use super::fit::{Peak, Search, peak};
 use super::gaussian::Normal;
+use super::own::Own;
 use super::rows::{Collected, Rows, Slice};
-use super::settings::Own;
 use nalgebra::DMatrix;
 
 /// Of the noises, every so many are tried for a place.

@@ -2,6 +2,8 @@
 
 use super::line::Line;
 use super::measured::Measured;
+use super::members::{Member, members};
+use super::own::Own;
 use crate::Error;
 use fewbits_numerics::error::{finite, non_negative, positive, refuse, within};
 use nalgebra::Vector3;
@@ -130,45 +132,6 @@ impl Default for RangeSettings {
     }
 }
 
-/// Which anchors have a bias of their own, and its deviation.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Own {
-    /// All anchors, or none if the deviation is zero.
-    Each(f64),
-    /// One anchor.
-    Only { anchor: usize, deviation: f64 },
-}
-
-impl Own {
-    pub(super) fn deviation(&self) -> f64 {
-        match *self {
-            Self::Each(deviation) | Self::Only { deviation, .. } => deviation,
-        }
-    }
-
-    /// The deviation of an anchor's own bias.
-    pub(super) fn of(&self, anchor: usize) -> f64 {
-        let is_meant = self.only().is_none_or(|only| only == anchor);
-        if is_meant { self.deviation() } else { 0.0 }
-    }
-
-    pub(super) fn only(&self) -> Option<usize> {
-        match *self {
-            Self::Each(_) => None,
-            Self::Only { anchor, .. } => Some(anchor),
-        }
-    }
-
-    /// Number of biases of single anchors.
-    pub(super) fn count(&self, anchors: usize) -> usize {
-        match *self {
-            Self::Each(deviation) if deviation > 0.0 => anchors,
-            Self::Each(_) => 0,
-            Self::Only { .. } => 1,
-        }
-    }
-}
-
 /// All numbers, in the unit of the anchors' coordinates.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Known {
@@ -192,8 +155,8 @@ pub(super) struct Known {
     /// One in the middle, and whether the first is that of a target that rests.
     pub(super) middle_speed: usize,
     pub(super) has_rest: bool,
-    pub(super) log_noises: Vec<f64>,
-    pub(super) log_speeds: Vec<f64>,
+    /// Filter by filter: speed by speed, for each the noises.
+    pub(super) bank: Vec<Member>,
     pub(super) outliers: f64,
     pub(super) stray: f64,
     pub(super) persistence: f64,
@@ -224,7 +187,7 @@ impl Known {
             self.has_rest = false;
             self.middle_speed -= 1;
             self.speeds.remove(0);
-            self.log_speeds.remove(0);
+            self.bank.drain(..self.noises.len());
         }
     }
 }
@@ -363,8 +326,7 @@ impl RangeSettings {
             anchors_spread: spread,
             measured,
             size,
-            log_noises: noises.iter().map(|one| one.ln()).collect(),
-            log_speeds: speeds.iter().map(|one| one.ln()).collect(),
+            bank: members(&speeds, &noises),
             noises,
             speeds,
             middle_speed,
