@@ -214,6 +214,25 @@ impl Fit {
         ])
     }
 
+    /// Every parameter that was found, with the limits of an interval that has it in 95 of a hundred tables: 1.96 standard errors to either side, or
+    /// farther to one side.
+    #[getter]
+    fn limits(&self) -> Outcome<Table> {
+        let estimates = &self.found.estimates;
+        let (quantities, sensors) = self.titles(estimates.iter().map(|one| one.quantity));
+        let limits = |one: &library::Estimate| match one.interval() {
+            (low, high) if self.is_threshold(one.quantity) => (-high, -low),
+            limits => limits,
+        };
+        let (low, high): (Vec<f64>, Vec<f64>) = estimates.iter().map(limits).unzip();
+        Table::new(vec![
+            ("quantity".to_owned(), quantities),
+            ("sensor".to_owned(), sensors),
+            ("low".to_owned(), doubles(low)),
+            ("high".to_owned(), doubles(high)),
+        ])
+    }
+
     /// Every parameter that was looked for and not found, and why.
     #[getter]
     fn refused(&self) -> Outcome<Table> {
@@ -256,6 +275,19 @@ impl Fit {
             ("second".to_owned(), texts(all.iter().map(|one| self.names[one.sensors.1].clone()))),
             ("value".to_owned(), doubles(all.iter().map(|one| one.value).collect())),
             ("standard_error".to_owned(), doubles(all.iter().map(|one| one.standard_error).collect())),
+        ])
+    }
+
+    /// Faults of sensors that are no parameters, and explain the readings far better: sensor, kind (`inverted-bits`, `hysteresis`, `lag`, `absent-above`
+    /// or `absent-below`), size, and evidence in nats.
+    #[getter]
+    fn faults(&self) -> Outcome<Table> {
+        let all = &self.found.faults;
+        Table::new(vec![
+            ("sensor".to_owned(), texts(all.iter().map(|one| self.names[one.sensor].clone()))),
+            ("kind".to_owned(), texts(all.iter().map(|one| one.kind.name().to_owned()))),
+            ("size".to_owned(), doubles(all.iter().map(|one| one.size).collect())),
+            ("evidence".to_owned(), doubles(all.iter().map(|one| one.evidence).collect())),
         ])
     }
 
@@ -354,6 +386,7 @@ impl Fit {
                 .correlations
                 .iter()
                 .all(|one| one.sensors.0.max(one.sensors.1) < count)
+            && found.faults.iter().all(|one| one.sensor < count)
     }
 
     fn is_threshold(&self, quantity: Quantity) -> bool {

@@ -204,7 +204,7 @@ def calibrated():
 def test_what_a_fit_found():
     table, found = calibrated()
     for other in (pickle.loads(pickle.dumps(found)), copy.deepcopy(found)):
-        for name in ("parameters", "refused", "tests", "correlations"):
+        for name in ("parameters", "limits", "refused", "tests", "correlations", "faults"):
             assert pl.DataFrame(getattr(found, name)).equals(pl.DataFrame(getattr(other, name)), null_equal=True)
         assert (found.first, found.log_likelihood, found.relative_to) == (other.first, other.log_likelihood, other.relative_to)
         runs = [pl.DataFrame(one.centre(send="word:3").run(table, time="t")) for one in (found, other)]

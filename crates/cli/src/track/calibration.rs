@@ -123,7 +123,11 @@ fn page(calibrated: &Calibrated, names: &[String], bits: &[usize], rows: &[Insta
             Quantity::Bias(sensor) if bits.contains(&sensor) => (format!("threshold of {}", names[sensor]), -one.value),
             _ => (title.clone(), one.value),
         };
-        text += &format!("{name:<50} {:>13} {:>13}\n", column(value), column(one.standard_error));
+        let limits = one
+            .limits
+            .map(|(low, high)| format!("  95 in 100: {} to {}", short(low), short(high)));
+        let (value, error) = (column(value), column(one.standard_error));
+        text += &format!("{name:<50} {value:>13} {error:>13}{}\n", limits.unwrap_or_default());
     }
     for one in &found.correlations {
         let name = format!("correlation of {} and {}", names[one.sensors.0], names[one.sensors.1]);

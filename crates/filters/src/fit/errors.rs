@@ -8,8 +8,13 @@ use nalgebra::{DMatrix, DVector};
 /// Standard errors above these say that a parameter is not determined: of logarithms, and in units of the search.
 const UNDETERMINED_LOG: f64 = 2.0;
 const UNDETERMINED: f64 = 30.0;
-/// A step in a delay by which the likelihood falls by more than so many nats is halved.
+/// A step in a delay by which the likelihood falls by more nats is halved, by fewer doubled, within limits in intervals between readings.
 const FAR: f64 = 8.0;
+const NEAR: f64 = 2.0;
+const DELAYS: std::ops::Range<f64> = 1e-3..8.0;
+/// Deviations at which the fall of the likelihood is compared with that of a parabola, and how many times as large one may be.
+const COMPARED: [f64; 3] = [1.0, 2.0, 3.0];
+const WIDEST: f64 = 30.0;
 
 /// The covariance of the parameters that the readings determine, in units of the search.
 pub(super) struct Spread {
@@ -23,27 +28,49 @@ impl Problem<'_> {
     /// From the second derivatives of the likelihood. Parameters that the readings do not determine are left out, one after the other: the others'
     /// errors are those with it held where it is.
     pub(super) fn spread(&self) -> Spread {
-        // The likelihood has a kink in a delay wherever two readings change places.
         let origin = DVector::zeros(self.free.len());
         let here = self.log_likelihood(&self.model);
-        let step = |(i, quantity): (usize, &Quantity)| {
-            if !matches!(quantity, Quantity::Delay(_)) {
-                return 1e-2;
-            }
+        // The likelihood has a kink in a delay wherever two readings change places.
+        let lost = |point: &DVector<f64>| here - self.log_likelihood(&self.at(point));
+        let step = |along: &dyn Fn(f64) -> DVector<f64>| {
+            let fall = |step: f64| lost(&along(step)).min(lost(&along(-step)));
             let mut step = 0.25;
-            let lost = |by: f64| {
-                let mut point = origin.clone();
-                point[i] = by;
-                here - self.log_likelihood(&self.at(&point))
-            };
-            // Not so far that the likelihood is no parabola any more.
-            while step > 1e-3 && lost(step).min(lost(-step)) > FAR {
+            let mut found = fall(step);
+            // Farther than from one kink to the next, and not so far that the likelihood is no parabola any more.
+            while step < DELAYS.end && found < NEAR {
+                step *= 2.0;
+                found = fall(step);
+            }
+            while step > DELAYS.start && found > FAR {
                 step *= 0.5;
+                found = fall(step);
             }
             step
         };
-        let steps: Vec<f64> = self.free.iter().enumerate().map(step).collect();
-        let found = information(|point| self.log_likelihood(&self.at(point)), &origin, &steps);
+        let delays: Vec<usize> = (0..self.free.len())
+            .filter(|i| matches!(self.free[*i], Quantity::Delay(_)))
+            .collect();
+        let mut steps = vec![1e-2; self.free.len()];
+        for i in &delays {
+            steps[*i] = step(&|by| {
+                let mut point = origin.clone();
+                point[*i] = by;
+                point
+            });
+        }
+        let mut found = information(|point| self.log_likelihood(&self.at(point)), &origin, &steps);
+        if delays.len() > 1 {
+            // Kinks of two delays hide how little the readings may tell of what all have in common.
+            let mut common = origin.clone();
+            delays.iter().for_each(|i| common[*i] = 1.0);
+            let by = step(&|by| &common * by);
+            let bent = (lost(&(&common * by)) + lost(&(&common * -by))) / (by * by);
+            let image = &found * &common;
+            let is_bent = common.dot(&image);
+            if bent < is_bent {
+                found -= &image * image.transpose() * ((1.0 - bent.max(0.0) / is_bent) / is_bent);
+            }
+        }
         let is_number = |i: &usize| found.row(*i).iter().all(|one| one.is_finite());
         let mut determined: Vec<usize> = (0..self.free.len()).filter(is_number).collect();
         loop {
@@ -65,10 +92,34 @@ impl Problem<'_> {
             // The one that exceeds its limit by most.
             let worst = (0..count).max_by(|one, other| excess(one).total_cmp(&excess(other)));
             let Some(worst) = worst.filter(|worst| excess(worst) > 1.0) else {
-                return Spread { determined, factor };
+                return self.with_kinks(Spread { determined, factor });
             };
             determined.remove(worst);
         }
+    }
+
+    /// Between kinks the likelihood is more bent than over several of them: each principal deviation is so large that the likelihood falls at least as
+    /// far as that of a normal distribution.
+    fn with_kinks(&self, mut spread: Spread) -> Spread {
+        if !self.free.iter().any(|one| matches!(one, Quantity::Delay(_))) {
+            return spread;
+        }
+        let here = self.log_likelihood(&self.model);
+        for mut axis in spread.factor.column_iter_mut() {
+            let lost = |by: f64| {
+                let mut point = DVector::zeros(self.free.len());
+                spread
+                    .determined
+                    .iter()
+                    .zip(axis.iter())
+                    .for_each(|(i, along)| point[*i] = by * along);
+                here - self.log_likelihood(&self.at(&point))
+            };
+            let wider = COMPARED.map(|by| by / (2.0 * lost(by).min(lost(-by)).max(0.0)).sqrt());
+            let wider = wider.into_iter().fold(1.0, f64::max).min(WIDEST);
+            axis *= wider;
+        }
+        spread
     }
 
     /// Standard errors. Parameters that the readings do not determine are refused.
@@ -101,6 +152,7 @@ impl Problem<'_> {
                 quantity: *quantity,
                 value,
                 standard_error: along.norm() * unit,
+                limits: None,
             });
         }
         estimates

@@ -15,6 +15,7 @@ mod correlations;
 mod errors;
 mod faults;
 mod filter;
+mod intervals;
 mod likelihood;
 mod model;
 mod parameters;
@@ -216,6 +217,7 @@ fn fitted(instants: &[Instant], sensors: usize, request: &Request, goes_on: &dyn
     if problem.part.is_none() {
         estimates.iter_mut().for_each(|one| posterior::widen(one, &posterior));
     }
+    problem.limits(&spread, &mut estimates);
     let log_likelihood = problem.model.log_likelihood(instants)?.0;
     let mut residuals = vec![Vec::new(); sensors];
     let scored = |sensor: usize, score: f64| residuals[sensor].push(score);

@@ -1,5 +1,6 @@
 //! Parameters, and what is known of them.
 
+use super::intervals::DEVIATIONS;
 use super::model::LevelModel;
 use serde::{Deserialize, Serialize};
 
@@ -74,6 +75,17 @@ pub struct Estimate {
     pub value: f64,
     /// Its standard error.
     pub standard_error: f64,
+    /// Limits of an interval that has it in 95 of a hundred tables, where these are not the value less and plus 1.96 standard errors.
+    #[serde(default)]
+    pub limits: Option<(f64, f64)>,
+}
+
+impl Estimate {
+    /// An interval that has the parameter in 95 of a hundred tables: [`limits`](Self::limits), or 1.96 standard errors to either side.
+    pub fn interval(&self) -> (f64, f64) {
+        let half = DEVIATIONS * self.standard_error;
+        self.limits.unwrap_or((self.value - half, self.value + half))
+    }
 }
 
 /// A parameter that was not found, and why. It has the value of a sensor without that fault.

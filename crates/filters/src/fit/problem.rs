@@ -12,7 +12,7 @@ pub(super) const WORTH: f64 = 2.0;
 /// The same of a level that returns, if nobody asked, beside one that returns in so many times the table's length: a walk stays within the readings
 /// by chance.
 const CERTAIN: f64 = 11.0;
-const LONG: f64 = 10.0;
+pub(super) const LONG: f64 = 10.0;
 /// Deviation of the logarithm of a change or a noise about the first guess: nothing may be taken for zero only because the readings do not
 /// tell it from zero.
 const VAGUE: f64 = 2.0;
@@ -23,6 +23,8 @@ const LITTLE: f64 = 1e-6;
 pub(super) const ENOUGH: f64 = 1e-2;
 /// Half of the delays that are tried, in half intervals between readings.
 const DELAYS: i32 = 12;
+/// How often they are tried at the end of a climb.
+const ROUNDS: usize = 3;
 /// The same of a first search, in whole intervals.
 const FAR_DELAYS: i32 = 64;
 
@@ -189,12 +191,7 @@ impl<'a> Problem<'a> {
             self.step_up(None, LITTLE);
             let mut found = self.step_up(None, LITTLE).value;
             if self.free.iter().any(|one| matches!(one, Quantity::Delay(_))) {
-                // The likelihood has kinks in a delay, at which a climb may end.
-                let (finer, model) = self.with_best_delays(self.model.clone(), -DELAYS..=DELAYS, 0.125);
-                if finer > found {
-                    self.model = model;
-                    found = self.step_up(None, LITTLE).value;
-                }
+                found = self.leave_kinks(found);
             }
             if best.as_ref().is_none_or(|(most, _)| found > *most) {
                 best = Some((found, self.model.clone()));
@@ -216,7 +213,49 @@ impl<'a> Problem<'a> {
         self.climb();
     }
 
-    /// A model with the best of several delays about its own, one sensor after the other.
+    /// The likelihood has kinks in a delay, at which a climb may end: tries other delays, and climbs from these. `found`: the present value.
+    fn leave_kinks(&mut self, mut found: f64) -> f64 {
+        for _ in 0..ROUNDS {
+            let (_, far) = self.with_common_delay(self.model.clone(), -DELAYS..=DELAYS, 0.5);
+            let (finer, model) = self.with_best_delays(far, -DELAYS..=DELAYS, 0.125);
+            if finer <= found + ENOUGH {
+                break;
+            }
+            self.model = model;
+            found = self.step_up(None, LITTLE).value;
+        }
+        found
+    }
+
+    /// A model whose delays are all longer by the best of several times: where the reference is noisy, the others say far more of the differences between
+    /// their delays than it says of each.
+    fn with_common_delay(
+        &self,
+        model: LevelModel,
+        range: std::ops::RangeInclusive<i32>,
+        step: f64,
+    ) -> (f64, LevelModel) {
+        let delays = self.free.iter().filter(|one| matches!(one, Quantity::Delay(_)));
+        let mut best = (self.worth(&model), model);
+        if delays.clone().count() < 2 {
+            return best;
+        }
+        let middle = best.1.clone();
+        for steps in range.filter(|steps| *steps != 0) {
+            let mut model = middle.clone();
+            for quantity in delays.clone() {
+                let later = quantity.of(&middle).unwrap_or(0.0) + step * f64::from(steps) * self.interval;
+                quantity.set(&mut model, later);
+            }
+            let found = self.worth(&model);
+            if found > best.0 {
+                best = (found, model);
+            }
+        }
+        best
+    }
+
+    /// A model with the best of several delays about its own, one sensor after the other, and all together.
     fn with_best_delays(
         &self,
         model: LevelModel,
@@ -238,7 +277,7 @@ impl<'a> Problem<'a> {
                 }
             }
         }
-        best
+        self.with_common_delay(best.1, range, step)
     }
 
     pub(super) fn take_best(&mut self, models: impl Iterator<Item = LevelModel>) {

@@ -21,6 +21,10 @@ pub struct Calibration {
     pub sensors: Vec<CalibratedSensor>,
     /// Name, value and standard error of each parameter that was found.
     pub estimates: Vec<(String, f64, f64)>,
+    /// Name and limits of each parameter whose interval reaches farther to one side: it is within in 95 of a hundred tables. The others are within
+    /// 1.96 standard errors.
+    #[serde(default)]
+    pub limits: Vec<(String, f64, f64)>,
     /// Name of each parameter that was not found, and the reason.
     pub refused: Vec<(String, String)>,
     /// Seconds after the first row at which the level jumps.

@@ -250,6 +250,11 @@ fn stored(found: &Fit, names: &[String], bits: &[usize]) -> Calibration {
             .iter()
             .map(|one| (title(one.quantity, names), one.value, one.standard_error))
             .collect(),
+        limits: found
+            .estimates
+            .iter()
+            .filter_map(|one| one.limits.map(|(low, high)| (title(one.quantity, names), low, high)))
+            .collect(),
         refused: found
             .refused
             .iter()

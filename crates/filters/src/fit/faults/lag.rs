@@ -7,7 +7,7 @@ use crate::calibration::Instant;
 use fewbits_numerics::normal::quantile;
 
 /// Probability with which one of all sensors of values lags by chance.
-const BY_CHANCE: f64 = 5e-4;
+const BY_CHANCE: f64 = 1e-2;
 /// Half widths of the ways that are tried, in noises of the sensor.
 const WAYS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 /// Rows whose products may be correlated.

@@ -20,9 +20,9 @@ use crate::calibration::{Instant, Reading};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
-/// Nats by which a fault of bits explains the readings better, so that one of two is as certain as 99 in a hundred: half of the square of a normal number
-/// that is beyond its limit to one side in one of 200 cases. The number of sensors of bits is added as its logarithm.
-const CERTAIN: f64 = 3.3;
+/// Nats by which a fault of bits explains the readings better, so that one of two is as certain as 99 in a hundred: of 150 sound tables one reached more.
+/// Of two independent tests at a boundary it would be 3.3. The number of sensors of bits is added as its logarithm.
+const CERTAIN: f64 = 2.6;
 /// Readings or instants from which a fault is found, at least.
 const FEWEST: usize = 30;
 /// A screened point that is worse by more nats than this is not climbed from.
@@ -49,6 +49,19 @@ pub enum FaultKind {
     AbsentAbove,
     /// Values below a limit are absent. The size is the limit.
     AbsentBelow,
+}
+
+impl FaultKind {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::InvertedBits => "inverted-bits",
+            Self::Hysteresis => "hysteresis",
+            Self::Lag => "lag",
+            Self::AbsentAbove => "absent-above",
+            Self::AbsentBelow => "absent-below",
+        }
+    }
 }
 
 /// A fault of a sensor for which the model has no parameter. The numbers that were found suppose that it is not there.
