@@ -103,12 +103,15 @@ impl Settings {
                 rows = (2 * rows).min(most);
             }
         }
-        let may_hold = !known && !options.reports && options.silent_within.is_none() && !is_single;
-        let held = if may_hold {
+        let may_repeat = !known && !options.reports && options.silent_within.is_none();
+        let held = if may_repeat && !is_single {
             instants.leave_out_repetitions()
         } else {
             Vec::new()
         };
+        if may_repeat && is_single {
+            instants.leave_out_copies();
+        }
         let first: Vec<Instant> = instants.peek(rows)?.iter().take(rows).cloned().collect();
         if first.is_empty() {
             return Err(Error::Empty);

@@ -204,6 +204,11 @@ impl<R: Rows> Instants<R> {
         self.held.iter().flat_map(Held::sensors).collect()
     }
 
+    /// The same of single reports: those that come again a little later.
+    pub(crate) fn leave_out_copies(&mut self) {
+        self.held = Some(Held::of_single(&mut self.ahead, self.source.names().len()));
+    }
+
     /// The same of repetitions alone, from so many first rows.
     pub(crate) fn leave_out_old(&mut self, count: usize) -> Result<Vec<usize>, Error> {
         self.peek(count)?;
