@@ -39,7 +39,9 @@ pub(crate) struct Again {
 
 /// Seconds within which values of a sensor repeat, from times and values; 0 if they do not.
 fn within(values: &[(f64, f64)]) -> f64 {
-    let pairs = values.windows(2).map(|pair| (pair[1].0 - pair[0].0, pair[1].1 == pair[0].1));
+    let pairs = values
+        .windows(2)
+        .map(|pair| (pair[1].0 - pair[0].0, pair[1].1 == pair[0].1));
     let (equal, others): (Vec<_>, Vec<_>) = pairs.partition(|pair| pair.1);
     if others.len() < FEWEST_OTHERS {
         return 0.0;
@@ -74,13 +76,25 @@ impl Again {
         }
     }
 
-    /// Whether no sensor repeats.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.columns.iter().all(|column| column.within == 0.0)
+    /// Takes repetitions out of a row, as if the sensor had not been asked.
+    pub(crate) fn leave_out(&mut self, row: &mut Instant) {
+        if self.columns.iter().all(|column| column.within == 0.0) {
+            return;
+        }
+        let seconds = row.seconds;
+        let again = row
+            .reports
+            .iter()
+            .map(|(sensor, cell)| self.repeats(*sensor, seconds, *cell));
+        let again: Vec<bool> = again.collect();
+        let mut of_reports = again.iter();
+        row.reports.retain(|_| !of_reports.next().is_some_and(|again| *again));
+        let mut of_qualifiers = again.iter();
+        row.qualifiers
+            .retain(|_| !of_qualifiers.next().is_some_and(|again| *again));
     }
 
-    /// Whether a report is a repetition.
-    pub(crate) fn repeats(&mut self, sensor: usize, seconds: f64, cell: Option<f64>) -> bool {
+    fn repeats(&mut self, sensor: usize, seconds: f64, cell: Option<f64>) -> bool {
         let (Some(column), Some(value)) = (self.columns.get_mut(sensor), cell) else {
             return false;
         };

@@ -6,7 +6,6 @@
 //! ```
 //! By chance that share is then at most .06. Repetitions say nothing new: taken for measurements, they make bands too narrow.
 
-use crate::first::again::Again;
 use crate::first::constant::Constants;
 use crate::first::derived::{Derived, derived};
 use crate::first::marks::Marks;
@@ -36,7 +35,6 @@ pub(crate) struct Held {
     marks: Marks,
     constants: Constants,
     derived: Vec<Derived>,
-    again: Again,
 }
 
 /// Longest run of repetitions in values, if they are held.
@@ -79,43 +77,24 @@ fn columns(first: &VecDeque<Instant>, sensors: usize) -> Vec<Column> {
 impl Held {
     /// Leaves them out of the first rows.
     pub(crate) fn begin(first: &mut VecDeque<Instant>, sensors: usize) -> Self {
-        let copies = Self::of_single(first, sensors);
         let marks = Marks::begin(first, sensors);
         let mut held = Self {
             columns: columns(first, sensors),
             marks,
             constants: Constants::begin(first.make_contiguous(), sensors),
             derived: derived(first.make_contiguous(), sensors),
-            again: Again::default(),
         };
         first.iter_mut().for_each(|row| held.leave_out(row));
-        // What was left out of the first rows stays counted.
-        held.again = copies.again;
         held
-    }
-
-    /// Leaves only reports that come again a little later out of the first rows.
-    pub(crate) fn of_single(first: &mut VecDeque<Instant>, sensors: usize) -> Self {
-        let mut held = Self::of_copies(first, sensors);
-        first.iter_mut().for_each(|row| held.leave_out(row));
-        held
-    }
-
-    fn of_copies(first: &VecDeque<Instant>, sensors: usize) -> Self {
-        Self {
-            columns: Vec::new(),
-            marks: Marks::begin(&VecDeque::new(), sensors),
-            constants: Constants::begin(&[], sensors),
-            derived: Vec::new(),
-            again: Again::of(first, sensors),
-        }
     }
 
     /// Leaves only repetitions out of the first rows.
     pub(crate) fn of_repetitions(first: &mut VecDeque<Instant>, sensors: usize) -> Self {
         let mut held = Self {
             columns: columns(first, sensors),
-            ..Self::of_copies(&VecDeque::new(), sensors)
+            marks: Marks::begin(&VecDeque::new(), sensors),
+            constants: Constants::begin(&[], sensors),
+            derived: Vec::new(),
         };
         first.iter_mut().for_each(|row| held.leave_out(row));
         held
@@ -130,7 +109,6 @@ impl Held {
     /// What numbers are taken for gaps, and which columns are constant or computed from others.
     pub(crate) fn hints(&self, names: &[String]) -> Vec<String> {
         let mut lines = self.marks.hints(names);
-        lines.extend(self.again.hints(names));
         lines.extend(self.constants.hints(names));
         lines.extend(self.derived.iter().map(|one| one.hint(names)));
         lines
@@ -139,15 +117,13 @@ impl Held {
     /// Takes them out of the next row; a repetition as if the sensor had not been asked.
     pub(crate) fn leave_out(&mut self, row: &mut Instant) {
         self.marks.leave_out(row);
-        let is_plain = self.sensors().next().is_none() && self.constants.is_empty() && self.derived.is_empty();
-        if is_plain && self.again.is_empty() {
+        if self.sensors().next().is_none() && self.constants.is_empty() && self.derived.is_empty() {
             return;
         }
         let mut stays = Vec::with_capacity(row.reports.len());
         for (sensor, cell) in &row.reports {
             let is_derived = self.derived.iter().any(|one| one.column() == *sensor);
-            let is_again = self.again.repeats(*sensor, row.seconds, *cell);
-            if is_again || self.constants.repeats(*sensor, *cell) || is_derived {
+            if self.constants.repeats(*sensor, *cell) || is_derived {
                 stays.push(false);
                 continue;
             }
