@@ -317,7 +317,9 @@ impl Roles {
             let mut others = QUANTITIES.iter().filter(|own| !own.contains(&those[0]));
             others.any(|own| has(name, own))
         };
-        let is_said_beside = |name: &String, those: &[&str]| has(name, those) && !is_other(name, those);
+        // A forecast of a temperature is none.
+        let is_said_beside =
+            |name: &String, those: &[&str]| has(name, those) && (those == BESIDE[2] || !is_other(name, those));
         let is_beside = |those: &&&[&str]| !all.iter().all(|name| is_said_beside(name, those));
         // `level_low` and `level_high` beside `level`.
         let is_bound = |name: &String| {

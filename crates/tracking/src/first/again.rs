@@ -21,6 +21,8 @@ const FEWEST: usize = 3;
 /// Share of the near pairs that are equal at least, and of the others at most.
 const NEARLY_ALL: f64 = 0.9;
 const HARDLY_ANY: f64 = 0.2;
+/// Coarsely rounded values are equal at any distance: all near pairs are, and that by chance with this probability at most, in nats.
+const SURELY: f64 = 20.0;
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Column {
@@ -50,10 +52,11 @@ fn within(values: &[(f64, f64)]) -> f64 {
     let count = |pairs: &[(f64, bool)]| pairs.iter().filter(|pair| pair.0 <= within).count();
     let (near, near_others) = (count(&equal), count(&others));
     let (far, far_others) = (equal.len() - near, others.len() - near_others);
-    let is_again = near >= FEWEST
-        && near as f64 >= NEARLY_ALL * (near + near_others) as f64
-        && far as f64 <= HARDLY_ANY * (far + far_others) as f64;
-    if is_again { within } else { 0.0 }
+    let is_seldom = far as f64 <= HARDLY_ANY * (far + far_others) as f64;
+    let is_fine = is_seldom && near >= FEWEST && near as f64 >= NEARLY_ALL * (near + near_others) as f64;
+    let chance = (far + 1) as f64 / (far + far_others + 1) as f64;
+    let is_coarse = near_others == 0 && -chance.ln() * near as f64 >= SURELY;
+    if is_fine || is_coarse { within } else { 0.0 }
 }
 
 impl Again {

@@ -5,7 +5,7 @@
 //! | `options`, `report` | what is known of level and sensors, what sensors send |
 //! | `settings` | what options and first rows say |
 //! | `found`, `later`, `open` | what is found from first rows, again while rows come, and what they leave open |
-//! | `hints`, `doubts` | what the first rows suggest that no option says, what values say against the stated noise |
+//! | `hints`, `doubts`, `repeating` | what the first rows suggest that no option says, what values say against the stated noise |
 //! | `world`, `meaning`, `stated` | the model of the level, what cells mean, readings that state their meaning |
 //! | `centre`, `estimator`, `remote`, `saved`, `revised` | the centre, its half of a sensor, states to which it returns |
 //! | `band` | the band of an estimate |
@@ -24,6 +24,7 @@ mod meaning;
 mod open;
 pub(crate) mod options;
 mod remote;
+mod repeating;
 pub(crate) mod report;
 mod revised;
 mod saved;

@@ -95,3 +95,67 @@ impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
         self.restore(mark).then(|| now - instants)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use crate::level::centre::centre;
+    use crate::level::estimator::{Estimator, Revision, Use};
+    use crate::level::options::{LevelOptions, PerSensor};
+    use crate::level::settings::Settings;
+    use crate::rows::Instants;
+    use crate::rows::instant::Instant;
+
+    fn row(k: usize) -> Instant {
+        let value = 20.0 + (1.7 * k as f64).sin();
+        Instant::new(k as u64 + 1, k as f64, &[Some(value), (k % 5 != 2).then_some(value + 0.1)])
+    }
+
+    /// The rows so far through a centre that can return.
+    fn centre_of(rows: &[Instant]) -> Box<dyn Estimator> {
+        let options = LevelOptions {
+            noise: PerSensor::all(Some(0.5)),
+            change: Some((0.1, 1.0)),
+            prior: Some((20.0, 3.0)),
+            smooth: true,
+            ..LevelOptions::default()
+        };
+        let mut instants = Instants::listed(["a", "b"], rows.to_vec());
+        let mut settings = Settings::find(&options, &mut instants).unwrap();
+        settings.world.is_followed = true;
+        let mut found = centre(&settings.world, Use::Measurements).unwrap();
+        for (sensor, name) in ["a", "b"].iter().enumerate() {
+            found.join(settings.seat(sensor, name)).unwrap();
+        }
+        rows.iter().for_each(|row| _ = found.step(row).unwrap());
+        found
+    }
+
+    #[test]
+    fn a_revision_that_fails_changes_nothing() {
+        let rows: Vec<Instant> = (0..100).map(row).collect();
+        let mut swapped = rows.clone();
+        swapped.swap(97, 98);
+        let revision = |noise: f64, scale: f64, last| Revision {
+            noises: vec![(1, noise)],
+            scale: Some(scale),
+            instants: 30,
+            last,
+        };
+        // A noise, a change and rows that are none.
+        for (noise, scale, last) in [(f64::NAN, 2.0, &rows), (0.8, -1.0, &rows), (0.8, 2.0, &swapped)] {
+            let (mut revised, mut other) = (centre_of(&rows), centre_of(&rows));
+            assert!(revised.revise(&revision(noise, scale, last)).is_err());
+            // Also the way back from the last row.
+            [&mut revised, &mut other].map(|centre| centre.undo());
+            for k in 99..140 {
+                assert_eq!(revised.step(&row(k)).unwrap(), other.step(&row(k)).unwrap(), "row {k}");
+            }
+            let rows: Vec<Instant> = (0..140).map(row).collect();
+            let again = revision(0.8, 2.0, &rows);
+            assert_eq!(revised.smoothed(None).unwrap(), other.smoothed(None).unwrap());
+            assert_eq!(revised.revise(&again).unwrap(), other.revise(&again).unwrap());
+        }
+    }
+}

@@ -288,6 +288,8 @@ impl Settings {
             settings.find_openness(if is_refined { more } else { &first }, &names, &unknown);
             if is_live {
                 settings.later = Some(Later::new(unknown, first.len(), most));
+                // Behind estimates that are written the model stays.
+                settings.may_slope = false;
             }
         }
         if !options.reports && !instants.has_samples() {
