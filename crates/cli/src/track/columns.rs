@@ -13,7 +13,7 @@ const LABELS: [&str; 18] = [
 /// From this one on, numbers are names too, where places are looked for.
 const PLACED: usize = 12;
 /// Names of a column of the standard deviations of each row's values.
-const ACCURACIES: [&str; 9] = [
+const ACCURACIES: [&str; 10] = [
     "accuracy",
     "hacc",
     "stderr",
@@ -23,9 +23,10 @@ const ACCURACIES: [&str; 9] = [
     "stdev",
     "sd",
     "uncertainty",
+    "variance",
 ];
 /// The same beside one column of values; of several sensors they may be something else.
-const ERRORS: [&str; 3] = ["error", "err", "precision"];
+const ERRORS: [&str; 6] = ["error", "err", "precision", "var", "ci95", "u95"];
 /// Names of the column of ranges among others.
 const RANGES: [&str; 3] = ["range", "distance", "dist"];
 /// Names of columns that say how good a fix is, or whose it is: no sensor measures them.
@@ -54,6 +55,8 @@ const BESIDE: [&[&str]; 3] = [
 /// Ends of what a mean is of.
 const ENDS: [&str; 4] = ["min", "max", "minimum", "maximum"];
 const MEANS: [&str; 4] = ["mean", "avg", "average", "median"];
+/// Ends of a band around the value of which the rest of the name is that.
+const BOUNDS: [&str; 8] = ["low", "high", "lower", "upper", "lo", "hi", "lwr", "upr"];
 /// Words of quantities: columns of two of them measure no common level.
 const QUANTITIES: [&[&str]; 8] = [
     &["lat", "latitude"],
@@ -314,14 +317,25 @@ impl Roles {
             let mut others = QUANTITIES.iter().filter(|own| !own.contains(&those[0]));
             others.any(|own| has(name, own))
         };
-        let is_said_beside = |name: &String, those: &[&str]| has(name, those) && !is_other(name, those);
+        // A forecast of a temperature is none.
+        let is_said_beside =
+            |name: &String, those: &[&str]| has(name, those) && (those == BESIDE[2] || !is_other(name, those));
         let is_beside = |those: &&&[&str]| !all.iter().all(|name| is_said_beside(name, those));
+        // `level_low` and `level_high` beside `level`.
+        let is_bound = |name: &String| {
+            let own = words(name);
+            let (Some(last), rest) = (own.last(), &own[..own.len().saturating_sub(1)]) else {
+                return false;
+            };
+            BOUNDS.contains(&last.as_str()) && !rest.is_empty() && all.iter().any(|other| words(other) == rest)
+        };
         let is_mean_there = all.iter().any(|name| has(name, &MEANS));
         let measures_none = |name: &&&String| {
             let first = words(name);
             first.first().is_some_and(|word| NO_LEVELS.contains(&word.as_str()))
                 || (first.len() == 1 && has(name, &NUMBERS))
                 || BESIDE.iter().filter(is_beside).any(|those| is_said_beside(name, those))
+                || is_bound(name)
                 || (is_mean_there && has(name, &ENDS) && !has(name, &MEANS))
         };
         let those: Vec<String> = all

@@ -12,6 +12,7 @@
 //!
 //! What is estimated, and what is told of it, is `fewbits_tracking`.
 
+mod accuracies;
 mod anchors;
 pub(crate) mod calibration;
 mod columns;

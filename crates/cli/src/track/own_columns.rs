@@ -1,5 +1,6 @@
 //! Which columns of a table are sensors, and which qualify their values.
 
+use super::accuracies::Accuracy;
 use crate::error::Error;
 use fewbits_table::Side;
 use fewbits_tracking::Qualifier;
@@ -10,6 +11,8 @@ pub(super) struct OwnColumns {
     pub(super) sensors: Vec<usize>,
     /// Of each column, the place of that of its accuracies.
     accuracies: Vec<Option<usize>>,
+    /// What each of them states.
+    kinds: Vec<Accuracy>,
     threshold: Option<usize>,
     /// Number of accuracies that are 0 or below, and of those that are infinite.
     pub(super) strange: [u64; 2],
@@ -44,19 +47,43 @@ impl OwnColumns {
         place(accuracy)?;
         let of = |name: &String| place(accuracy_of(name));
         let accuracies: Vec<Option<usize>> = names.iter().map(of).collect::<Result<_, _>>()?;
+        let kind = |(name, place): (&String, &Option<usize>)| {
+            place.map_or(Accuracy::Deviation, |place| Accuracy::of(&names[place], name))
+        };
+        let kinds = names.iter().zip(&accuracies).map(kind).collect();
         let is_sensor = |i: &usize| Some(*i) != threshold && !accuracies.contains(&Some(*i));
         Ok(Self {
             sensors: (0..names.len()).filter(is_sensor).collect(),
             accuracies,
+            kinds,
             threshold,
             strange: [0; 2],
         })
     }
 
+    /// The standard deviation of the value at a place, as its row states it.
+    fn accuracy(&self, place: usize, cells: &Cells) -> Option<f64> {
+        let stated = cell(cells, self.accuracies[place])?;
+        Some(self.kinds[place].deviation(stated, cell(cells, Some(place)).unwrap_or(0.0)))
+    }
+
+    /// What is made of columns of accuracies that are no deviations, a line each. `names`: of all columns.
+    pub(super) fn hints(&self, names: &[String]) -> Vec<String> {
+        let mut those: Vec<(usize, Accuracy)> = Vec::new();
+        for place in &self.sensors {
+            let own = self.accuracies[*place].map(|accuracy| (accuracy, self.kinds[*place]));
+            those.extend(own.filter(|own| !those.contains(own)));
+        }
+        those
+            .iter()
+            .filter_map(|(place, kind)| kind.hint(&names[*place]))
+            .collect()
+    }
+
     /// What a row says of the value at a place. `limit`: the side on which it is, if it is a limit.
     pub(super) fn qualifier(&self, place: usize, cells: &Cells, limit: Option<Side>) -> Qualifier {
         Qualifier {
-            accuracy: cell(cells, self.accuracies[place]).filter(|accuracy| accuracy.is_finite()),
+            accuracy: self.accuracy(place, cells).filter(|accuracy| accuracy.is_finite()),
             threshold: cell(cells, self.threshold).filter(|threshold| threshold.is_finite()),
             limit,
         }

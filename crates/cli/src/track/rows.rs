@@ -16,6 +16,10 @@ use fewbits_tracking::{Failure, Instant, RowOptions, Rows};
 const LATE: f64 = 60.0;
 /// Seconds by which clocks are set back in autumn.
 const HOUR: f64 = 3600.0;
+/// Seconds by which no row is late: a clock is wrong.
+const FOREVER: f64 = 30.0 * 86_400.0;
+/// A pause is told if it is longer than that, and longer than so many of the longest one before.
+const PAUSES: f64 = 100.0;
 
 /// A table whose rows are instants.
 pub(super) struct TableRows {
@@ -31,6 +35,10 @@ pub(super) struct TableRows {
     last: f64,
     /// Seconds from the row before to the last.
     step: f64,
+    /// The longest such time so far.
+    longest: f64,
+    /// The first row behind a long pause, its time and the days of the pause.
+    pause: Option<(u64, String, f64)>,
     next_number: i64,
     /// Names of the sensors so far.
     names: Vec<String>,
@@ -117,6 +125,8 @@ impl TableRows {
             base,
             last: 0.0,
             step: 0.0,
+            longest: 0.0,
+            pause: None,
             next_number: 0,
             may_be_late: kind.late > 0.0,
             only: None,
@@ -187,6 +197,12 @@ impl TableRows {
                     "{above}: if the clock was set back by an hour, as in autumn, write times with their difference from UTC, as 2026-10-25T02:00:00+01:00; \
                      --late would mix the rows of both hours"
                 )
+            } else if matches!(self.base, TimeBase::Clock { .. }) && self.last - seconds > FOREVER {
+                let days = ((self.last - seconds) / 86_400.0).round();
+                format!(
+                    "{above}, by {days} days: a clock that was reset, as to 1970 at a restart, or that was wrong in the row above; correct these times \
+                     or take the rows out; --late would wait that long with every row"
+                )
             } else {
                 let late = self.latest(seconds).ceil().max(LATE);
                 format!("{above}: sort the rows by time, or say how late rows may be, as --late {late}s")
@@ -194,6 +210,11 @@ impl TableRows {
             return Err(Error::content(self.file(), problem));
         }
         self.step = seconds - self.last;
+        let is_pause = self.step > FOREVER && self.step > PAUSES * self.longest && self.longest > 0.0;
+        if is_pause && matches!(self.base, TimeBase::Clock { .. }) && self.pause.is_none() {
+            self.pause = Some((row, time.clone(), (self.step / 86_400.0).round()));
+        }
+        self.longest = self.longest.max(self.step);
         self.last = seconds;
         let limit = |place: usize| self.table.limit(place).filter(|_| self.has_limits);
         let qualifier = |place: &usize| self.own.qualifier(*place, &cells, limit(*place));
@@ -240,6 +261,14 @@ impl Rows for TableRows {
     }
 
     fn told(&self) -> Vec<String> {
-        self.strange_accuracies()
+        let mut lines = self.strange_accuracies();
+        lines.extend(self.own.hints(&self.table.names));
+        lines.extend(self.pause.iter().map(|(row, time, days)| {
+            format!(
+                "row {row}, of {time}, is {days} days after the row above, as behind a clock that was not yet set: if the times before are wrong, take \
+                 those rows out"
+            )
+        }));
+        lines
     }
 }

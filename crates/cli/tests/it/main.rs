@@ -32,6 +32,7 @@ mod tables;
 mod track;
 mod track_bands;
 mod track_columns;
+mod track_devices;
 mod track_faults;
 mod track_found;
 mod track_kinds;

@@ -1,6 +1,7 @@
 //! Detection limits that the first rows show.
 
 use crate::text::short;
+use fewbits_filters::calibration::median;
 
 /// Lower and upper limit.
 pub(crate) type Ends = (Option<f64>, Option<f64>);
@@ -14,8 +15,24 @@ const MORE: usize = 5;
 const FEWEST_MARKS: usize = 3;
 /// Beside it, values hardly ever repeat: at least this share of them are different.
 const DIFFERENT: f64 = 0.5;
+/// Or they repeat since they are rounded, though successive ones differ by so many steps: a level that rests would not be there more often than
+/// near it.
+const STEPS: f64 = 5.0;
 /// It is at most this share of the others' range away from them.
 const NEAR: f64 = 0.5;
+
+/// Whether successive values inside the range differ by many of the smallest differences.
+fn is_fine(values: &[f64], inner: &[&[f64]]) -> bool {
+    let (low, high) = (inner[0][0], inner[inner.len() - 1][0]);
+    let inside: Vec<f64> = values
+        .iter()
+        .copied()
+        .filter(|value| (low..=high).contains(value))
+        .collect();
+    let changes = inside.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+    let gaps = inner.windows(2).map(|pair| pair[1][0] - pair[0][0]);
+    median(changes) >= STEPS * gaps.fold(f64::INFINITY, f64::min)
+}
 
 /// Detection limits of a sensor from its values: an end of all values that many cells have, where others are hardly ever equal. A limit of 0 is
 /// told and not taken: many things are never below it, and often there.
@@ -32,7 +49,7 @@ pub(crate) fn found(values: &[f64], name: &str, told: &mut Vec<String>) -> Ends 
     let inner = &runs[1..runs.len() - 1];
     let most = inner.iter().map(|run| run.len()).max().unwrap_or(0);
     let count: usize = inner.iter().map(|run| run.len()).sum();
-    let is_various = inner.len() as f64 >= DIFFERENT * count as f64;
+    let is_various = inner.len() as f64 >= DIFFERENT * count as f64 || is_fine(values, inner);
     let reach = NEAR * (inner[inner.len() - 1][0] - inner[0][0]);
     let is_limit = |run: &[f64]| is_various && run.len() * SHARE >= values.len() && run.len() > MORE * most.max(1);
     // Of values that mark gaps a few suffice.
@@ -44,7 +61,8 @@ pub(crate) fn found(values: &[f64], name: &str, told: &mut Vec<String>) -> Ends 
         }
         if gap > reach {
             told.push(format!(
-                "{name} has {many} values {}, far from all others: if it marks a gap, say --missing {at}",
+                "{name} has {many} values {}, far from all others: if it marks a gap, say --missing {at}; if it stands for values below a detection \
+                 limit, write the limit, as <0.5",
                 short(at)
             ));
             return None;

@@ -6,8 +6,10 @@
 //! | `groups`, `lags` | groups of sensors of different levels, sensors that come late |
 //! | `lasting` | errors that last from row to row |
 //! | `stuck`, `held`, `constant`, `derived` | sensors that repeat one value, columns that hold values, never vary, or are computed from others |
+//! | `again` | reports that come again a little later |
 //! | `limits`, `marks`, `units`, `rounding` | detection limits, numbers that stand for gaps, changes of the unit, steps of rounding |
 
+pub(crate) mod again;
 pub(crate) mod constant;
 pub(crate) mod derived;
 pub(crate) mod groups;

@@ -5,6 +5,7 @@ use crate::rows::instant::Instant;
 use crate::text;
 use fewbits_numerics::Runs;
 use fewbits_table::names::as_argument;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// Equal values in a row from which a sensor is told to be stuck, and others before it, at least.
@@ -86,9 +87,7 @@ pub(crate) struct Stuck {
 
 impl Stuck {
     pub(crate) fn add(&mut self, instant: &Instant) {
-        let cells = instant.reports.iter();
-        let values = cells.filter_map(|(sensor, cell)| Some((*sensor, cell.filter(|cell| cell.is_finite())?)));
-        let values: Vec<(usize, f64)> = values.collect();
+        let values: Vec<(usize, f64)> = instant.values().collect();
         for (at, (sensor, value)) in values.iter().enumerate() {
             if self.repeats.len() <= *sensor {
                 self.repeats.resize(sensor + 1, Repeats::default());
@@ -139,4 +138,33 @@ impl Stuck {
         let units = units.filter_map(|(repeats, name)| repeats.units.hint(&text::name(name)));
         stuck.chain(units).chain(self.pairs.iter().filter_map(copy)).collect()
     }
+}
+
+/// Rows without the values of sensors that are stuck: they say nothing of noise and of what sensors have in common. Other rows as they are.
+pub(crate) fn without_stuck(rows: &[Instant]) -> Cow<'_, [Instant]> {
+    let mut all: Vec<Vec<(usize, f64)>> = Vec::new();
+    for (row, instant) in rows.iter().enumerate() {
+        for (sensor, value) in instant.values() {
+            if all.len() <= sensor {
+                all.resize(sensor + 1, Vec::new());
+            }
+            all[sensor].push((row, value));
+        }
+    }
+    let mut found = Cow::Borrowed(rows);
+    for (sensor, values) in all.iter().enumerate() {
+        let runs = || values.chunk_by(|one, other| one.1 == other.1);
+        let is_long = |run: &&[(usize, f64)]| run.len() >= LONG as usize;
+        let long: usize = runs().filter(is_long).map(<[_]>::len).sum();
+        let repeated: usize = runs().filter(|run| !is_long(run)).map(|run| run.len() - 1).sum();
+        let others = values.len() - long;
+        if long == 0 || others < LONG as usize || repeated as f64 > SELDOM * others as f64 {
+            continue;
+        }
+        for (row, _) in runs().filter(is_long).flatten() {
+            let cells = found.to_mut()[*row].reports.iter_mut();
+            cells.filter(|cell| cell.0 == sensor).for_each(|cell| cell.1 = None);
+        }
+    }
+    found
 }

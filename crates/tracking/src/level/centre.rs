@@ -2,13 +2,14 @@
 
 use crate::error::Failure;
 use crate::first::lasting::{ErrorUnderLasting, Lasting};
-use crate::level::estimator::{Estimator, LevelRow, Use};
+use crate::level::band::{Pending, moments};
+use crate::level::estimator::{Estimator, Event, LevelRow, Revision, Use};
 use crate::level::meaning::Seat;
 use crate::level::open;
 use crate::level::options::Model;
 use crate::level::remote::remote;
 use crate::level::report::{Report, double};
-use crate::level::saved::{Mark, Marks, Saved};
+use crate::level::saved::{Marks, Saved};
 use crate::level::world::World;
 use crate::rows::instant::{Instant, Qualifier};
 use fewbits_core::{Gaussian, Message, NumberFormat, Observation, SensorNode, circle};
@@ -62,43 +63,36 @@ pub(crate) fn centre(world: &World, purpose: Use) -> Result<Box<dyn Estimator>, 
     })
 }
 
-struct Member {
-    seat: Seat,
-    node: Box<dyn SensorNode<1>>,
+pub(super) struct Member {
+    pub(super) seat: Seat,
+    pub(super) node: Box<dyn SensorNode<1>>,
     /// Its last value, less its offset.
-    last: Option<f64>,
+    pub(super) last: Option<f64>,
 }
 
-struct Centre<const D: usize, F: StateFilter<D>> {
-    centre: FusionCentre<D, F>,
-    members: Vec<Member>,
+pub(super) struct Centre<const D: usize, F: StateFilter<D>> {
+    pub(super) centre: FusionCentre<D, F>,
+    pub(super) members: Vec<Member>,
     purpose: Use,
     period: Option<f64>,
     is_on_change: bool,
     zero: f64,
     /// Factor of the level's deviation for what the rows leave open of change and noises.
     open: f64,
-    rng: Pcg64Mcg,
+    pub(super) rng: Pcg64Mcg,
     world: ContinuousLinear<D>,
     /// All beliefs, if they are to be smoothed.
-    kept: Option<Vec<Filtered<D>>>,
+    pub(super) kept: Option<Vec<Filtered<D>>>,
     /// The error under noise that lasts, and its deviation in those of the belief at each instant.
-    error: Option<ErrorUnderLasting>,
-    wider: Vec<f64>,
+    pub(super) error: Option<ErrorUnderLasting>,
+    pub(super) wider: Vec<f64>,
     interval: f64,
-    instants: usize,
-    marks: Option<Marks<F::Belief>>,
+    pub(super) instants: usize,
+    /// Values that are not believed yet.
+    pub(super) pending: Pending,
+    pub(super) marks: Option<Marks<F::Belief>>,
     /// The state before the last instant.
-    before: Option<Saved<F::Belief>>,
-}
-
-/// Mean and standard deviation of each coordinate. `wider`: factor of the level's; `zero`: deviation of what all of its values may be off.
-fn moments<const D: usize>(belief: &Gaussian<D>, wider: f64, zero: f64) -> Vec<(f64, f64)> {
-    let deviation = |i: usize| {
-        let own = belief.covariance()[(i, i)].sqrt();
-        if i == 0 { (wider * own).hypot(zero) } else { own }
-    };
-    (0..D).map(|i| (belief.mean()[i], deviation(i))).collect()
+    pub(super) before: Option<Saved<F::Belief>>,
 }
 
 /// Of angles that differ by whole periods, the one nearest to the prediction. Other values keep every bit: one at a detection limit is no
@@ -141,6 +135,7 @@ impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
             wider: Vec::new(),
             interval: world.interval,
             instants: 0,
+            pending: Pending::default(),
             marks: world.is_followed.then(Marks::new),
             before: None,
         })
@@ -150,7 +145,7 @@ impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
     fn wider(
         &mut self,
         instant: &Instant,
-        events: &[(&'static str, Option<usize>)],
+        events: &[Event],
         before: (f64, Gaussian<D>),
         forecast: &Gaussian<D>,
     ) -> f64 {
@@ -173,44 +168,6 @@ impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
             error.forget(belief);
         }
         (error.update(&gains) / belief).sqrt().max(1.0)
-    }
-
-    /// The present state.
-    fn saved(&self) -> Saved<F::Belief> {
-        Saved {
-            mark: Mark {
-                instants: self.instants,
-                state: self.centre.state(),
-                last: self.members.iter().map(|member| member.last).collect(),
-            },
-            error: self.error.clone(),
-            rng: self.rng.clone(),
-            dropped: None,
-        }
-    }
-
-    /// Returns to a state of the same sensors.
-    fn return_to(&mut self, mut saved: Saved<F::Belief>) {
-        self.marks.iter_mut().for_each(|marks| marks.undo(&mut saved));
-        (self.error, self.rng) = (saved.error, saved.rng);
-        self.restore(saved.mark);
-    }
-
-    /// Returns to a marked state. Whether it is one of the present sensors.
-    fn restore(&mut self, mark: Mark<F::Belief>) -> bool {
-        if self.centre.restore(mark.state).is_err() {
-            return false;
-        }
-        self.members
-            .iter_mut()
-            .zip(mark.last)
-            .for_each(|(member, last)| member.last = last);
-        self.instants = mark.instants;
-        if let Some(kept) = &mut self.kept {
-            kept.truncate(mark.instants);
-            self.wider.truncate(mark.instants);
-        }
-        true
     }
 
     fn slot(&mut self, sensor: usize, cell: Option<f64>, qualifier: Qualifier) -> Result<Slot, Failure> {
@@ -246,6 +203,24 @@ impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
             }
         };
         Ok(Slot::new(number, feedback, Observation::from(report)))
+    }
+
+    /// The deviation of a level of which the only sensor says something else, again and again.
+    fn doubt(&mut self, instant: &Instant, events: &[Event], level: f64) -> f64 {
+        let mut values = instant.values();
+        let (Some((sensor, value)), None) = (values.next(), values.next()) else {
+            self.pending.clear();
+            return 0.0;
+        };
+        let is_used = |sensor: usize| self.health(sensor).1;
+        let is_alone = (0..self.members.len()).all(|other| other == sensor || !is_used(other));
+        if !is_alone || self.purpose == Use::Reports || !events.contains(&("rejected", Some(sensor))) {
+            self.pending.clear();
+            return 0.0;
+        }
+        let seat = &self.members[sensor].seat;
+        let value = nearest(value - seat.offset, level, self.period);
+        self.pending.add(value, seat.usual(), level)
     }
 
     /// Processes an instant.
@@ -294,8 +269,10 @@ impl<const D: usize, F: StateFilter<D>> Centre<D, F> {
                     .any(|(event, _)| matches!(*event, "reopened" | "reacquired")),
             });
         }
+        let mut estimate = moments(&belief, wider, self.zero);
+        estimate[0].1 = estimate[0].1.max(self.doubt(instant, &events, estimate[0].0));
         Ok(LevelRow {
-            estimate: moments(&belief, wider, self.zero),
+            estimate,
             bits,
             reports,
             rejected,
@@ -351,30 +328,13 @@ impl<const D: usize, F: StateFilter<D>> Estimator for Centre<D, F> {
         }
     }
 
-    fn rescale(&mut self, scale: f64) -> Result<(), Failure> {
-        Ok(self.centre.set_noise_scale(scale)?)
-    }
-
-    fn set_noises(&mut self, noises: &[(usize, f64)]) -> Result<(), Failure> {
-        for (sensor, noise) in noises {
-            let member = &mut self.members[*sensor];
-            member.seat.noise = *noise;
-            member.node = member.seat.sends.node(noise * noise)?;
-            self.centre.join_boxed(*sensor as u32, remote(&member.seat)?)?;
-        }
-        Ok(())
+    fn revise(&mut self, revision: &Revision<'_>) -> Result<Option<LevelRow>, Failure> {
+        self.revised(revision)
     }
 
     fn under(&mut self, lasting: &Lasting) {
         let variance = self.centre.estimate().covariance()[(0, 0)];
         self.error = Some(ErrorUnderLasting::new(lasting.parts.clone(), variance));
-    }
-
-    fn back(&mut self, instants: usize) -> Option<usize> {
-        let now = self.instants;
-        let mark = self.marks.as_mut()?.take(now, instants)?;
-        let instants = mark.instants;
-        self.restore(mark).then(|| now - instants)
     }
 
     fn health(&self, sensor: usize) -> (f64, bool) {

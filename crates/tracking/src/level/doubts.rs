@@ -3,6 +3,7 @@
 use crate::first::groups::groups;
 use crate::first::lags::lags;
 use crate::first::lasting::{Parts, lasting};
+use crate::first::stuck::without_stuck;
 use crate::first::values::values_of;
 use crate::level::options::{LevelOptions, Model};
 use crate::level::report::Report;
@@ -10,11 +11,13 @@ use crate::level::settings::Settings;
 use crate::rows::instant::Instant;
 use crate::text;
 use crate::text::short;
-use fewbits_filters::calibration::{Number, median};
+use fewbits_filters::calibration::{Number, Reading, median};
 
 /// The stated noise is doubted if another explains the rows better by so many nats, and is so many times as large or small.
 const FAR_LIKELIER: f64 = 20.0;
 const FAR: f64 = 1.25;
+/// Accuracies are multiplied by it so many times at most.
+const MOST_STEPS: i32 = 12;
 /// Share of values that equal the one before them, above which a sensor may hold its values.
 const HELD: f64 = 0.25;
 
@@ -59,8 +62,67 @@ impl Settings {
             .collect()
     }
 
+    /// A line if other accuracies explain the values far better than those that rows state. `options`: what else is stated.
+    pub(crate) fn doubted_accuracies(
+        &self,
+        rows: &[Instant],
+        names: &[String],
+        options: &LevelOptions,
+    ) -> Option<String> {
+        let readings = self.readings(rows, names);
+        let change = match options.change {
+            Some(_) => Number::Known(self.world.change),
+            None => Number::Unknown {
+                guess: self.world.change,
+                least: 0.0,
+            },
+        };
+        let noises: Vec<Number> = (0..names.len())
+            .map(|i| Number::Known(self.seat(i, &names[i]).noise))
+            .collect();
+        let explained = |factor: f64| {
+            let mut readings = readings.clone();
+            for (_, reading) in readings.iter_mut().flat_map(|instant| &mut instant.values) {
+                if let Reading::Value {
+                    deviation: Some(deviation),
+                    ..
+                } = reading
+                {
+                    *deviation *= factor;
+                }
+            }
+            let found = self.world.calibrate(&readings, change, self.world.change, &noises);
+            found.map_or(f64::NEG_INFINITY, |found| found.log_likelihood)
+        };
+        let stated = explained(1.0);
+        let climb = |step: f64| {
+            let mut best = (1.0, stated);
+            for power in 1..=MOST_STEPS {
+                let factor = step.powi(power);
+                let found = explained(factor);
+                if found <= best.1 {
+                    break;
+                }
+                best = (factor, found);
+            }
+            best
+        };
+        let (factor, found) = [climb(FAR), climb(1.0 / FAR)]
+            .into_iter()
+            .max_by(|one, other| one.1.total_cmp(&other.1))?;
+        (found >= stated + FAR_LIKELIER).then(|| {
+            format!(
+                "the accuracies that rows state: values are far likelier if they are multiplied by {}: bands are too {}; if they are bands of 95 %, or \
+                 variances, give deviations",
+                short(factor),
+                if factor > 1.0 { "narrow" } else { "wide" }
+            )
+        })
+    }
+
     /// Looks at the differences of sensors: groups of them that measure different levels, those that come late, and errors that last.
     pub(crate) fn find_differences(&mut self, rows: &[Instant], names: &[String], options: &LevelOptions) {
+        let rows = &without_stuck(rows);
         let is_plain = self.world.period.is_none() && self.meaning.silent_within.is_none() && !self.is_single;
         if is_plain {
             let noises: Vec<f64> = (0..names.len()).map(|i| self.seat(i, &names[i]).noise).collect();

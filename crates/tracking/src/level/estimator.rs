@@ -31,6 +31,18 @@ pub struct LevelRow {
     pub full: Option<f64>,
 }
 
+/// What was otherwise than supposed in the last instants.
+pub(crate) struct Revision<'a> {
+    /// Noise of sensors.
+    pub(crate) noises: Vec<(usize, f64)>,
+    /// Factor of the change's variance, if it is another.
+    pub(crate) scale: Option<f64>,
+    /// In how many of the last instants, at least.
+    pub(crate) instants: usize,
+    /// The last instants, at least so many.
+    pub(crate) last: &'a [Instant],
+}
+
 /// A centre of any number of coordinates.
 pub(crate) trait Estimator {
     /// Adds the next sensor.
@@ -41,14 +53,11 @@ pub(crate) trait Estimator {
     fn step(&mut self, instant: &Instant) -> Result<LevelRow, Failure>;
     /// Returns to the state before the last step, with the same sensors.
     fn undo(&mut self);
-    /// Sets the factor of the change's variance.
-    fn rescale(&mut self, scale: f64) -> Result<(), Failure>;
-    /// Sets the noise of sensors.
-    fn set_noises(&mut self, noises: &[(usize, f64)]) -> Result<(), Failure>;
+    /// Goes through the last instants again under other noises or another change: what is known after the last one, if any was gone through.
+    /// If they give no valid model, nothing is changed.
+    fn revise(&mut self, revision: &Revision<'_>) -> Result<Option<LevelRow>, Failure>;
     /// States the error of estimates under noise that lasts.
     fn under(&mut self, lasting: &Lasting);
-    /// Returns to a state that is at least so many instants back, as far as they are kept: the number of instants since then.
-    fn back(&mut self, instants: usize) -> Option<usize>;
     /// Probability that a sensor works, and whether its reports are used.
     fn health(&self, sensor: usize) -> (f64, bool);
     /// Number of its reports that were rejected.

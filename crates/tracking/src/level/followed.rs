@@ -15,6 +15,7 @@ use crate::level::world::World;
 use crate::rows::instant::Instant;
 use crate::text::short;
 use fewbits_filters::calibration::{Number, wrapped};
+use fewbits_numerics::Runs;
 use std::collections::VecDeque;
 
 /// Factor of the deviations that are tried.
@@ -27,6 +28,8 @@ const LIMIT: f64 = 10.0;
 const FEWEST: usize = 8;
 /// Values from which it is found for the last time.
 const MOST: usize = 256;
+/// Repetitions of one value that are looked at, at most.
+const MOST_REPEATED: u32 = 3;
 /// Rows that are kept.
 const KEPT: usize = 512;
 /// Another noise, or change, explains the rows better by so many nats.
@@ -67,6 +70,7 @@ struct Watch {
     /// Its noise, if it has changed, and times and noises of all changes.
     noise: Option<f64>,
     told: Vec<(String, f64)>,
+    runs: Runs,
 }
 
 impl Watch {
@@ -171,10 +175,11 @@ impl Followed {
                 *sensor,
                 wrapped(value - offset - mean, settings.world.period),
                 noises.get(*sensor).copied().flatten()?,
+                value,
             ))
         });
-        let values: Vec<(usize, f64, f64)> = values.collect();
-        let weight = |one: &(usize, f64, f64)| if is_out(one.0) { 0.0 } else { 1.0 / (one.2 * one.2) };
+        let values: Vec<(usize, f64, f64, f64)> = values.collect();
+        let weight = |one: &(usize, f64, f64, f64)| if is_out(one.0) { 0.0 } else { 1.0 / (one.2 * one.2) };
         let (all, pull) = values
             .iter()
             .fold((1.0 / variance, 0.0), |(all, pull), one| (all + weight(one), pull + weight(one) * one.1));
@@ -192,8 +197,11 @@ impl Followed {
             } else {
                 z
             };
-            if z.is_finite() {
-                self.watches[one.0].add(row, z, apart);
+            let watch = &mut self.watches[one.0];
+            watch.runs.add(one.3);
+            // A sensor that is stuck has no noise.
+            if z.is_finite() && watch.runs.repetitions <= MOST_REPEATED {
+                watch.add(row, z, apart);
             }
         }
     }
@@ -215,9 +223,18 @@ impl Followed {
             .for_each(|(sensor, noise)| self.watches[*sensor].noise = Some(*noise));
     }
 
+    /// Tells no longer that the noise of sensors has changed.
+    pub(crate) fn forget(&mut self, noises: &[(usize, f64)]) {
+        for (sensor, _) in noises {
+            let watch = &mut self.watches[*sensor];
+            watch.told.pop();
+            watch.changed = None;
+        }
+    }
+
     /// The last rows.
-    pub(crate) fn last(&self, count: usize) -> impl Iterator<Item = &Instant> {
-        self.rows.iter().skip(self.rows.len().saturating_sub(count))
+    pub(crate) fn last(&self) -> impl Iterator<Item = &Instant> {
+        self.rows.iter()
     }
 
     /// What shall be supposed, if it is something else. `noises`: of all sensors; `scale`: the factor of the change's variance.

@@ -7,12 +7,13 @@ use crate::first::values::{steepest, values, values_of};
 use crate::level::later::Unknown;
 use crate::level::meaning::Seat;
 use crate::level::options::{LevelOptions, Model};
+use crate::level::repeating::REPEATING;
 use crate::level::report::Report;
 use crate::level::settings::Settings;
 use crate::level::world::World;
 use crate::rows::instant::{Instant, Qualifier};
 use fewbits_filters::calibration::{self, Calibration, Number, median, wrapped};
-use fewbits_filters::fit::{LevelModel, SensorModel, SensorTest};
+use fewbits_filters::fit::SensorTest;
 
 /// Ratio of the standard deviation of a normal variable to the median of its distance from its mean.
 const DEVIATION_OF_MEDIAN: f64 = 1.4826;
@@ -23,8 +24,6 @@ const NORMAL_MEDIAN: f64 = 0.6745;
 const DO_NOT_VARY: &str = "the first rows do not vary, so it cannot be found from them";
 /// The own noise of a sensor that rounds is at least this many steps.
 const LEAST_OWN: f64 = 0.05;
-/// Innovations repeat if their correlation is beyond so many deviations: once in a thousand tables of a right model.
-const REPEATING: f64 = 3.3;
 /// A model with a slope is suggested if it explains the first rows better by so many nats.
 const SLOPING: f64 = 20.0;
 
@@ -234,26 +233,38 @@ impl Settings {
             .world
             .calibrate(&readings, change, self.world.change, &noises)
             .map_err(refused)?;
-        // Silence cuts the belief: that of a walk is followed exactly, and that of a slope is not.
-        if unknown.change && self.world.model == Model::Walk && !self.world.is_on_grid {
-            // The same with a slope, which is only compared.
-            let sloping = World {
-                model: Model::Velocity,
-                ..self.world
-            };
-            let other = sloping.calibrate(&readings, change, self.world.change, &noises);
-            if let Some(other) = other
-                .ok()
-                .filter(|other| other.log_likelihood > found.log_likelihood + SLOPING)
-            {
-                self.has_slope = true;
-                if self.may_slope {
-                    (self.world.model, found) = (Model::Velocity, other);
-                }
-            }
-        }
+        self.compare_slope(&mut found, &readings, (change, &noises), unknown);
         self.take(found, unknown);
         Ok(())
+    }
+
+    /// Takes a model with a slope if it explains the readings far better than the walk under which `found` was found.
+    fn compare_slope(
+        &mut self,
+        found: &mut Calibration,
+        readings: &[calibration::Instant],
+        (change, noises): (Number, &[Number]),
+        unknown: &Unknown,
+    ) {
+        // Silence cuts the belief: that of a walk is followed exactly, and that of a slope is not.
+        if !unknown.change || self.world.model != Model::Walk || self.world.is_on_grid {
+            return;
+        }
+        // The same with a slope, which is only compared.
+        let sloping = World {
+            model: Model::Velocity,
+            ..self.world
+        };
+        let other = sloping.calibrate(readings, change, self.world.change, noises);
+        if let Some(other) = other
+            .ok()
+            .filter(|other| other.log_likelihood > found.log_likelihood + SLOPING)
+        {
+            self.has_slope = true;
+            if self.may_slope {
+                (self.world.model, *found) = (Model::Velocity, other);
+            }
+        }
     }
 
     fn take(&mut self, found: Calibration, unknown: &Unknown) {
@@ -280,69 +291,34 @@ impl Settings {
                 .calibrate(&readings, change, settings.world.change, &noises);
             found.map_or(f64::NEG_INFINITY, |found| found.log_likelihood)
         };
-        let before = (self.world.change, self.noise, self.found.clone());
+        let before = (self.world, self.noise, self.found.clone(), self.has_slope);
         let likelihood = explained(self);
         if unknown.change {
             // First rows without a change are no guess of that of the others.
             self.world.change = self.world.change.max(LEAST_GUESS * self.noise);
         }
         let (change, noises) = self.numbers(names, Some(unknown));
+        let readings_of_more = self.readings(more, names);
         let found = self
             .world
-            .calibrate(&self.readings(more, names), change, self.world.change, &noises);
+            .calibrate(&readings_of_more, change, self.world.change, &noises);
         let is_found = found.is_ok();
-        if let Ok(found) = found {
-            self.take(found, unknown);
+        if let Ok(mut found) = found {
+            self.take(found.clone(), unknown);
+            // A slope may show in more rows only: then differences from the forecasts of a walk last.
+            let lasts = |test: &SensorTest| test.repetition > REPEATING;
+            if self.may_slope && self.tests(&readings_of_more, names).iter().any(lasts) {
+                self.compare_slope(&mut found, &readings_of_more, (change, &noises), unknown);
+                self.take(found, unknown);
+            }
         }
         let numbers = noises.iter().chain([&change]);
         let free = numbers.filter(|one| matches!(one, Number::Unknown { .. })).count();
         let is_taken = is_found && explained(self) >= likelihood - (LOSS_ALONE + free as f64);
         if !is_taken {
-            (self.world.change, self.noise, self.found) = before;
+            (self.world, self.noise, self.found, self.has_slope) = before;
         }
         is_taken
-    }
-
-    /// Sensors whose innovations in the first rows repeat, or return: each wrongly with one in a thousand tables. Only of a level that wanders, read by
-    /// values.
-    pub(crate) fn repeating(&self, first: &[Instant], names: &[String]) -> Vec<String> {
-        let readings = self.readings(first, names);
-        let is_value = |(_, reading): &(usize, calibration::Reading)| reading.value().is_some();
-        let are_values = readings.iter().all(|instant| instant.values.iter().all(is_value));
-        if self.world.model != Model::Walk || self.world.period.is_some() || !are_values || self.lasting.is_some() {
-            return Vec::new();
-        }
-        // A constant offset, which is told elsewhere, would last too.
-        let biases = calibration::offsets(&readings, names.len(), None);
-        let sensors = names.iter().zip(biases).enumerate();
-        let model = LevelModel {
-            change: self.world.change / self.world.within.sqrt(),
-            time_constant: None,
-            mean: self.world.prior.0,
-            sensors: sensors
-                .map(|(sensor, (name, bias))| SensorModel {
-                    bias,
-                    ..SensorModel::exact(self.seat(sensor, name).noise)
-                })
-                .collect(),
-        };
-        let tests = model.tests(&readings).unwrap_or_default();
-        let line = |test: &SensorTest| {
-            let name = &names[test.sensor];
-            match test.repetition {
-                z if z > REPEATING => Some(format!(
-                    "{name}: its differences from the forecasts last for several rows ({z:.1} deviations), as a level that moves faster than supposed or a \
-                     noise that lasts makes them: bands may be too narrow; `fewbits fit --reference NAME --find walk` tells which"
-                )),
-                z if z < -REPEATING => Some(format!(
-                    "{name}: its differences from the forecasts turn back ({:.1} deviations), as a noise that sensors share makes them, which is taken \
-                     for the level: bands may be too narrow; --change says how much the level moves, and `fewbits fit --reference NAME` finds the shared noise",
-                    -z
-                )),
-                _ => None,
-            }
-        };
-        tests.iter().filter_map(line).collect()
     }
 
     /// Whether readings say only on which side of an end a measurement is, or within a cell that is wide beside the noise.

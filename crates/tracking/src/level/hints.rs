@@ -6,6 +6,7 @@ use crate::rows::instant::Instant;
 use crate::rows::transform::Transform;
 use crate::text::short;
 use fewbits_filters::calibration::{median, offsets};
+use fewbits_numerics::Runs;
 
 /// Periods of angles and their like.
 const PERIODS: [f64; 4] = [360.0, std::f64::consts::TAU, 400.0, 24.0];
@@ -27,6 +28,8 @@ const EMPTY: f64 = 0.5;
 const IRREGULAR: f64 = 3.0;
 /// Values of a sensor from which it is told whether its noise grows, at most.
 const MOST_VALUES: usize = 2000;
+/// Repetitions of one value that are looked at, at most.
+const MOST_REPEATED: u32 = 10;
 /// Stretches of values that are compared, and how many times as much values of one scatter as those of another.
 const STRETCHES: usize = 8;
 const UNSTEADY: f64 = 4.0;
@@ -264,6 +267,7 @@ pub(crate) struct Turning {
     asks_growth: bool,
     sensors: Vec<Option<Turns>>,
     values: Vec<Vec<f64>>,
+    runs: Vec<Runs>,
 }
 
 impl Turning {
@@ -275,22 +279,25 @@ impl Turning {
             asks_growth: is_plain && !options.has_accuracies && options.silent_within.is_none(),
             sensors: Vec::new(),
             values: Vec::new(),
+            runs: Vec::new(),
         }
     }
 
     pub(crate) fn add(&mut self, instant: &Instant) {
-        for (sensor, cell) in &instant.reports {
-            let Some(value) = cell.filter(|cell| cell.is_finite()) else {
-                continue;
-            };
+        for (sensor, value) in instant.values() {
+            let sensor = &sensor;
             if self.sensors.len() <= *sensor {
                 self.sensors.resize(sensor + 1, None);
                 self.values.resize(sensor + 1, Vec::new());
+                self.runs.resize(sensor + 1, Runs::default());
             }
+            self.runs[*sensor].add(value);
             if self.asks_period {
                 self.sensors[*sensor].get_or_insert(Turns::new(value)).add(value);
             }
-            if self.asks_growth && self.values[*sensor].len() < MOST_VALUES {
+            // Values of a sensor that is stuck have no noise.
+            let is_stuck = self.runs[*sensor].repetitions > MOST_REPEATED;
+            if self.asks_growth && !is_stuck && self.values[*sensor].len() < MOST_VALUES {
                 self.values[*sensor].push(value);
             }
         }

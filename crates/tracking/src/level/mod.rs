@@ -5,12 +5,14 @@
 //! | `options`, `report` | what is known of level and sensors, what sensors send |
 //! | `settings` | what options and first rows say |
 //! | `found`, `later`, `open` | what is found from first rows, again while rows come, and what they leave open |
-//! | `hints`, `doubts` | what the first rows suggest that no option says, what values say against the stated noise |
+//! | `hints`, `doubts`, `repeating` | what the first rows suggest that no option says, what values say against the stated noise |
 //! | `world`, `meaning`, `stated` | the model of the level, what cells mean, readings that state their meaning |
-//! | `centre`, `estimator`, `remote`, `saved` | the centre, its half of a sensor, states to which it returns |
+//! | `centre`, `estimator`, `remote`, `saved`, `revised` | the centre, its half of a sensor, states to which it returns |
+//! | `band` | the band of an estimate |
 //! | `followed` | noise that changes while rows come |
 //! | `summary` | what was found over all rows |
 
+mod band;
 mod centre;
 mod doubts;
 pub(crate) mod estimator;
@@ -22,7 +24,9 @@ mod meaning;
 mod open;
 pub(crate) mod options;
 mod remote;
+mod repeating;
 pub(crate) mod report;
+mod revised;
 mod saved;
 mod settings;
 mod stated;
@@ -35,7 +39,7 @@ use crate::rows::instant::Instant;
 use crate::rows::rhythm::Rhythm;
 use crate::rows::{Instants, Rows};
 use centre::centre;
-use estimator::{Estimator, Event, LevelRow, Use};
+use estimator::{Estimator, Event, LevelRow, Revision, Use};
 use followed::{Followed, Shift};
 use hints::Turning;
 use meaning::Seat;
@@ -131,8 +135,7 @@ impl LevelTracker {
     /// Processes an instant, in the order of time. `names`: of the sensors so far, [`Instants::names`]. Without a result of one that is no row.
     ///
     /// # Errors
-    /// If the time is before that of the last instant, a report is of no sensor or is none that its sensor sends: the tracker is then as it was. If
-    /// what rows tell of noise and change later gives no valid model: the tracker cannot go on.
+    /// If the time is before that of the last instant, a report is of no sensor or is none that its sensor sends: the tracker is then as it was.
     pub fn step(&mut self, names: &[String], instant: &Instant) -> Result<Option<LevelRow>, Error> {
         if let Some((sensor, _)) = instant.reports.iter().find(|(sensor, _)| *sensor >= names.len()) {
             return Err(Error::Content {
@@ -142,7 +145,7 @@ impl LevelTracker {
         }
         if !instant.is_row {
             let row = self.advance(instant)?;
-            self.learn(names, instant)?;
+            self.learn(names, instant);
             self.between.extend(row.events);
             // It has no row of its own.
             self.are_rows.iter_mut().for_each(|rows| rows.push(false));
@@ -155,11 +158,11 @@ impl LevelTracker {
         }
         let found = self.join(names, instant.row).and_then(|()| self.advance(&instant));
         let mut row = found.inspect_err(|_| self.rhythm = rhythm)?;
-        self.follow(&instant, &mut row)?;
+        self.follow(&instant, &mut row);
         row.events.splice(0..0, std::mem::take(&mut self.between));
         self.squares += row.full.map_or(0.0, |full| (full - row.estimate[0].0).powi(2));
         self.summary.add(&instant, &row, &self.names);
-        self.learn(names, &instant)?;
+        self.learn(names, &instant);
         self.are_rows.iter_mut().for_each(|rows| rows.push(true));
         self.turning.add(&instant);
         if let Some(stuck) = &mut self.stuck {
@@ -194,48 +197,49 @@ impl LevelTracker {
         Ok(row)
     }
 
-    /// Finds change and noise again if enough rows have come. All rows so far are then gone through anew.
-    fn learn(&mut self, names: &[String], instant: &Instant) -> Result<(), Error> {
+    /// Finds change and noise again if enough rows have come. All rows so far are then gone through anew. What gives no valid model is not taken.
+    fn learn(&mut self, names: &[String], instant: &Instant) {
         let Some(mut later) = self.settings.later.take() else {
-            return Ok(());
+            return;
         };
         let (rows, (unknown, first)) = (later.add(instant).map(<[_]>::to_vec), later.unknown());
-        let again = rows.filter(|rows| self.settings.find_again((&rows[..first], rows), names, unknown));
-        if let Some(rows) = again {
-            let seats: Vec<Seat> = self
-                .names
-                .iter()
-                .enumerate()
-                .map(|(sensor, name)| self.settings.seat(sensor, name))
-                .collect();
-            let again = |purpose: Use| {
-                let mut centre = centre(&self.settings.world, purpose)?;
-                self.settings.lasting.iter().for_each(|lasting| centre.under(lasting));
-                seats.iter().try_for_each(|seat| centre.join(seat.clone()))?;
-                rows.iter().try_for_each(|row| centre.step(row).map(|_| ()))?;
-                Ok::<_, Failure>(centre)
-            };
-            self.centre = again(self.purpose).map_err(Error::refused(REFUSED))?;
-            let followed = self.followed.take().filter(|_| self.settings.lasting.is_none());
-            self.followed = followed.map(|_| Followed::default());
-            if self.full.is_some() {
-                self.full = Some(again(Use::Comparison).map_err(Error::refused(REFUSED))?);
-            }
-            self.summary.noise = self.settings.noise;
-            self.summary.change = self.settings.world.change;
-            for (sensor, seat) in self.summary.sensors.iter_mut().zip(&seats) {
-                sensor.noise = seat.noise;
+        if let Some(rows) = rows {
+            let before = self.settings.clone();
+            let is_taken =
+                self.settings.find_again((&rows[..first], &rows), names, unknown) && self.restart(&rows).is_ok();
+            if !is_taken {
+                self.settings = before;
             }
         }
         self.settings.later = Some(later).filter(|later| !later.is_done());
+    }
+
+    /// Goes through all rows so far under the present settings, or changes nothing.
+    fn restart(&mut self, rows: &[Instant]) -> Result<(), Failure> {
+        let names = self.names.iter().enumerate();
+        let seats: Vec<Seat> = names.map(|(sensor, name)| self.settings.seat(sensor, name)).collect();
+        let again = |purpose: Use| {
+            let mut centre = centre(&self.settings.world, purpose)?;
+            self.settings.lasting.iter().for_each(|lasting| centre.under(lasting));
+            seats.iter().try_for_each(|seat| centre.join(seat.clone()))?;
+            rows.iter().try_for_each(|row| centre.step(row).map(|_| ()))?;
+            Ok::<_, Failure>(centre)
+        };
+        let full = self.full.is_some().then(|| again(Use::Comparison)).transpose()?;
+        (self.centre, self.full) = (again(self.purpose)?, full);
+        let followed = self.followed.take().filter(|_| self.settings.lasting.is_none());
+        self.followed = followed.map(|_| Followed::default());
+        self.summary.noise = self.settings.noise;
+        self.summary.change = self.settings.world.change;
+        for (sensor, seat) in self.summary.sensors.iter_mut().zip(&seats) {
+            sensor.noise = seat.noise;
+        }
         Ok(())
     }
 
     /// Looks whether the noise of sensors is another than supposed. If so, rows are gone through anew from where it changed.
-    fn follow(&mut self, instant: &Instant, row: &mut LevelRow) -> Result<(), Error> {
-        let Some(followed) = &mut self.followed else {
-            return Ok(());
-        };
+    fn follow(&mut self, instant: &Instant, row: &mut LevelRow) {
+        let Some(followed) = &mut self.followed else { return };
         let (settings, names) = (&self.settings, &self.names);
         let sensors = self.summary.sensors.iter().enumerate();
         let all: Vec<f64> = sensors.map(|(sensor, one)| followed.noise(sensor, one.noise)).collect();
@@ -250,30 +254,35 @@ impl LevelTracker {
             scale,
         }) = followed.shift(settings, names, &all, &used, row.noise_scale)
         else {
-            return Ok(());
+            return;
         };
         // What is stated is kept.
         noises.retain(|(sensor, _)| settings.noises.of(&names[*sensor]).is_none());
         if noises.is_empty() && scale.is_none() {
-            return Ok(());
+            return;
         }
+        let last: Vec<Instant> = followed.last().cloned().collect();
+        let revision = Revision {
+            noises,
+            scale,
+            instants: rows.len(),
+            last: &last,
+        };
+        let Ok(revised) = self.centre.revise(&revision) else {
+            // What is supposed stays.
+            followed.forget(&revision.noises);
+            return;
+        };
+        followed.take(&revision.noises);
         self.settings.later = None;
-        followed.take(&noises);
-        let refused = Error::row(instant.row);
-        self.centre.set_noises(&noises).map_err(&refused)?;
-        let events = noises.iter().map(|(sensor, _)| ("noise changed", Some(*sensor)));
-        let mut events: Vec<Event> = events.collect();
-        let back = self.centre.back(rows.len());
-        if let Some(scale) = scale {
-            self.centre.rescale(scale).map_err(&refused)?;
-        }
+        let events = revision.noises.iter();
+        let mut events: Vec<Event> = events.map(|(sensor, _)| ("noise changed", Some(*sensor))).collect();
         let full = row.full;
-        for instant in followed.last(back.unwrap_or(0)) {
-            *row = self.centre.step(instant).map_err(&refused)?;
+        if let Some(revised) = revised {
+            *row = revised;
         }
         row.full = full;
         row.events.append(&mut events);
-        Ok(())
     }
 
     /// Whole periods that are taken off a level to write it within one period; 0 of a level that is no angle.

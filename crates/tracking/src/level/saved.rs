@@ -1,6 +1,7 @@
 //! States of a centre to which it can return.
 
 use crate::first::lasting::ErrorUnderLasting;
+use crate::level::band::Pending;
 use fewbits_filters::centre::CentreState;
 use rand_pcg::Pcg64Mcg;
 use std::collections::VecDeque;
@@ -17,6 +18,7 @@ pub(crate) struct Mark<B> {
     pub(crate) state: CentreState<B>,
     /// The last value of each member.
     pub(crate) last: Vec<Option<f64>>,
+    pub(crate) pending: Pending,
 }
 
 /// All that an instant changes.
@@ -29,6 +31,7 @@ pub(crate) struct Saved<B> {
 }
 
 /// Marks of the last instants.
+#[derive(Clone)]
 pub(crate) struct Marks<B>(VecDeque<Mark<B>>);
 
 impl<B: Clone> Marks<B> {

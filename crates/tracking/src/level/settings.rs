@@ -103,8 +103,11 @@ impl Settings {
                 rows = (2 * rows).min(most);
             }
         }
-        let may_hold = !known && !options.reports && options.silent_within.is_none() && !is_single;
-        let held = if may_hold {
+        let may_repeat = !known && !options.reports && options.silent_within.is_none();
+        if may_repeat {
+            instants.leave_out_again();
+        }
+        let held = if may_repeat && !is_single {
             instants.leave_out_repetitions()
         } else {
             Vec::new()
@@ -128,6 +131,12 @@ impl Settings {
         let sensors = instants.names().len();
         let has_negative = (0..sensors).any(|sensor| values_of(looked_at, sensor).iter().any(|value| *value < 0.0));
         let mut told = instants.source().found().to_vec();
+        told.extend(
+            instants
+                .options()
+                .transform
+                .and_then(|transform| transform.doubt(&first)),
+        );
         let names = instants.names().to_vec();
         told.extend(held.iter().map(|sensor| {
             format!(
@@ -279,6 +288,8 @@ impl Settings {
             settings.find_openness(if is_refined { more } else { &first }, &names, &unknown);
             if is_live {
                 settings.later = Some(Later::new(unknown, first.len(), most));
+                // Behind estimates that are written the model stays.
+                settings.may_slope = false;
             }
         }
         if !options.reports && !instants.has_samples() {
@@ -312,6 +323,12 @@ impl Settings {
             && !instants.has_samples()
         {
             settings.hints.extend(settings.doubts(&more, &names));
+        }
+        let may_doubt = settings.meaning.has_accuracy && !settings.world.is_on_grid && !instants.source().is_live();
+        if may_doubt && !known {
+            settings
+                .hints
+                .extend(settings.doubted_accuracies(&more, &names, options));
         }
         let seen = Seen {
             has_slope: settings.has_slope,

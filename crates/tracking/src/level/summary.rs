@@ -12,6 +12,9 @@ const PRINTED_EVENTS: usize = 12;
 const OFTEN: f64 = 0.05;
 /// And so many of them: a few may be spikes, which are no noise.
 const FEWEST_REJECTED: u64 = 5;
+/// Jumps of the level of which rejected reports are told to be, at least, and reports of each, at most.
+const FEWEST_JUMPS: u64 = 3;
+const MOST_AT_A_JUMP: u64 = 5;
 /// Bits are told to be more or less surprising than predicted from so many deviations on: by chance of one sensor in 16000.
 const SURPRISING: f64 = 4.0;
 
@@ -194,6 +197,7 @@ fn lines(summary: &LevelSummary) -> Vec<String> {
     if summary.copies > 0 {
         lines.push(format!("{} copies of reports were dropped", summary.copies));
     }
+    let reopened = summary.events.iter().filter(|event| event.event == "reopened").count() as u64;
     for sensor in summary.sensors.iter().filter(|sensor| sensor.rejected > 0) {
         let reports = sensor.reports + if summary.is_silence_said { sensor.gaps } else { 0 };
         let is_noisy =
@@ -203,7 +207,9 @@ fn lines(summary: &LevelSummary) -> Vec<String> {
             sensor.name,
             sensor.rejected,
             if summary.is_silence_said { " and silences" } else { "" },
-            if is_noisy {
+            if is_noisy && reopened >= FEWEST_JUMPS && sensor.rejected <= MOST_AT_A_JUMP * reopened {
+                ": they are those behind jumps of the level, which one sensor alone shows at the fourth value; --change states a larger change"
+            } else if is_noisy {
                 ": its noise is larger than supposed, or was so for a while, and bands are too narrow; --noise states a larger one"
             } else {
                 ""

@@ -45,4 +45,15 @@ impl Instant {
             qualifiers: vec![Qualifier::default(); cells.len()],
         }
     }
+
+    /// Sensors and their values, without those that are limits.
+    pub(crate) fn values(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let is_limit = |i: usize| {
+            self.qualifiers
+                .get(i)
+                .is_some_and(|qualifier| qualifier.limit.is_some())
+        };
+        let cells = self.reports.iter().enumerate().filter(move |(i, _)| !is_limit(*i));
+        cells.filter_map(|(_, (sensor, cell))| Some((*sensor, cell.filter(|cell| cell.is_finite())?)))
+    }
 }

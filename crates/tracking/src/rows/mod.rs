@@ -15,6 +15,7 @@ pub(crate) mod samples;
 pub(crate) mod transform;
 
 use crate::error::{Error, Failure};
+use crate::first::again::Again;
 use crate::first::held::Held;
 use correction::{Correction, correct};
 use instant::{Instant, Qualifier, Reports};
@@ -102,6 +103,8 @@ pub struct Instants<R> {
     late: Late,
     /// Measurements between rows.
     samples: Option<Samples>,
+    /// Reports that come again a little later.
+    again: Again,
     /// What is left out of rows because it only repeats.
     held: Option<Held>,
 }
@@ -131,6 +134,7 @@ impl<R: Rows> Instants<R> {
             pending: None,
             late: Late::new(options.late),
             samples: options.sampled.map(Samples::new),
+            again: Again::default(),
             held: None,
             options,
         }
@@ -164,7 +168,9 @@ impl<R: Rows> Instants<R> {
 
     /// What was left out of rows, or is strange in them, a line each.
     pub(crate) fn told(&self) -> Vec<String> {
-        let mut lines: Vec<String> = self.held.iter().flat_map(|held| held.hints(self.names())).collect();
+        let mut lines = self.again.hints(self.names());
+        let held = self.held.iter().flat_map(|held| held.hints(self.names()));
+        lines.extend(held);
         lines.extend(self.source.told());
         lines
     }
@@ -204,6 +210,12 @@ impl<R: Rows> Instants<R> {
         self.held.iter().flat_map(Held::sensors).collect()
     }
 
+    /// The same of reports that come again a little later.
+    pub(crate) fn leave_out_again(&mut self) {
+        self.again = Again::of(&self.ahead, self.source.names().len());
+        self.ahead.iter_mut().for_each(|row| self.again.leave_out(row));
+    }
+
     /// The same of repetitions alone, from so many first rows.
     pub(crate) fn leave_out_old(&mut self, count: usize) -> Result<Vec<usize>, Error> {
         self.peek(count)?;
@@ -215,8 +227,9 @@ impl<R: Rows> Instants<R> {
 
     fn read_new(&mut self) -> Result<Option<Instant>, Error> {
         let mut found = self.read_with_samples()?;
-        if let (Some(held), Some(row)) = (&mut self.held, &mut found) {
-            held.leave_out(row);
+        if let Some(row) = &mut found {
+            self.again.leave_out(row);
+            self.held.iter_mut().for_each(|held| held.leave_out(row));
         }
         Ok(found)
     }

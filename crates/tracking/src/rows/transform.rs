@@ -5,7 +5,11 @@
 //! log    ln v               a noise in proportion to the value: it is that proportion
 //! ```
 
-use crate::rows::instant::Reports;
+use crate::rows::instant::{Instant, Reports};
+use fewbits_filters::calibration::median;
+
+/// Counts of which the noise of the root is 1, at least.
+const FEWEST_COUNTS: f64 = 4.0;
 /// Triples of values from which it is told whether the noise grows, at least.
 const FEWEST: usize = 40;
 /// Different values, at least: the noise of coarsely rounded values depends on where the level is between two steps.
@@ -38,6 +42,17 @@ impl Transform {
             Self::Root => 2.0 * (value + 0.375).sqrt(),
             Self::Log => value.ln(),
         }
+    }
+
+    /// A line if the transform of most of these values has no noise of one size. They are transformed.
+    pub(crate) fn doubt(self, rows: &[Instant]) -> Option<String> {
+        let values = rows.iter().flat_map(Instant::values).map(|(_, value)| value).collect();
+        (self == Self::Root && median(values) < self.of(FEWEST_COUNTS)).then(|| {
+            format!(
+                "most counts are below {FEWEST_COUNTS}: the noise of their roots is not the same everywhere, and bands are too narrow; add up the counts \
+                 of several rows"
+            )
+        })
     }
 
     /// The value of which this is the transform.
