@@ -249,7 +249,7 @@ fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, O
     }
     let playback = Playback::open(path).map_err(Error::recording(&file))?;
     let schema = playback.schema().clone();
-    let begin = playback.ticks().map_err(Error::recording(&file))?.map(|ticks| ticks.0);
+    let (begin, end) = playback.ticks().map_err(Error::recording(&file))?.unzip();
     drop(playback);
     let table_options = continued(&options.table, &schema, &file)?;
     let open = || -> Result<Table, Error> {
@@ -269,6 +269,20 @@ fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, O
     };
     let mut table = open()?;
     check_clock(&mut table, schema.time(), begin, &file, "pack the table into a file of its own")?;
+    if let (TimeBase::Clock { decimals, .. }, Some((scale, Some(first))), Some(end)) =
+        (schema.time(), table.first_time()?, end)
+        && let end = Time::from_ticks(end, decimals)
+        && first < end
+    {
+        let shown = |time: Time| time.shown(scale, time.decimals());
+        say!(
+            "note: {}: its first time, {}, is before the last of {file}, {}: rows stay in the order in which they come, and the same rows \
+             twice are twice there",
+            table.file(),
+            shown(first),
+            shown(end)
+        );
+    }
     // A live table is appended as it comes: its rows cannot be read again.
     if !target::is_live() {
         TableRows::new(open()?, schema.time()).check()?;

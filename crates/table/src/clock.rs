@@ -13,7 +13,7 @@ use crate::named::{NAMES, OF_DAY, is_exact_name, is_time_name, starts_an_interva
 use crate::parts::{calendar, monthly, of_day_parts, parts, weeks};
 use crate::sample::{Refused, dated_hours, majority, with_stated_unit};
 use crate::stated;
-use crate::time::{Scale, Time, Unit};
+use crate::time::{Scale, Unit};
 use crate::written::{self, Clock, Order, Syntax};
 use std::borrow::Cow;
 
@@ -262,18 +262,11 @@ pub(crate) fn clock(
     };
     let stated = zero.map(|(unit, zero)| (Syntax::Since(unit, zero), Scale::Utc));
     if let Some((syntax, scale)) = stated.or_else(|| dialect.time_format.as_deref().and_then(written::since)) {
+        let zone = zone_text.as_deref().and_then(written::zone);
         return Ok(Clock {
-            syntax,
-            zone: zone_text
-                .as_deref()
-                .and_then(written::zone)
-                .filter(|_| scale == Scale::Local),
-            scale,
-            takes_leap_seconds: false,
-            cuts: false,
-            parts_behind: None,
+            zone: zone.filter(|_| scale == Scale::Local),
             marks,
-            largest: Time(i128::MAX),
+            ..Clock::new(syntax, scale)
         });
     }
     let largest = doubts::largest(&cells);
@@ -310,25 +303,17 @@ pub(crate) fn clock(
         _ if has_offset || zone_text.is_some() => Scale::Utc,
         _ => Scale::Local,
     };
-    let beyond = match (&syntax, &dialect.time_format) {
-        (Syntax::Number(unit), None) => doubts::most(&cells, *unit),
-        _ => Time(i128::MAX),
-    };
-    if let (Syntax::Number(unit), None) = (&syntax, &dialect.time_format)
-        && *unit != Unit::Seconds
-    {
-        let text = ["s", "ms", "us", "ns"][usize::from(unit.decimals() / 3)];
-        dialect.time_format = Some(text.to_owned());
-    }
-    let zone = zone_text.as_deref().and_then(written::zone);
-    Ok(Clock {
-        syntax,
-        zone,
-        scale,
-        takes_leap_seconds: false,
-        cuts: false,
-        parts_behind: None,
+    let mut clock = Clock {
+        zone: zone_text.as_deref().and_then(written::zone),
         marks,
-        largest: beyond,
-    })
+        ..Clock::new(syntax, scale)
+    };
+    if let (Syntax::Number(unit), None) = (&clock.syntax, &dialect.time_format) {
+        clock.largest = doubts::most(&cells, *unit);
+        if *unit != Unit::Seconds {
+            let text = ["s", "ms", "us", "ns"][usize::from(unit.decimals() / 3)];
+            dialect.time_format = Some(text.to_owned());
+        }
+    }
+    Ok(clock)
 }

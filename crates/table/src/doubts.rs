@@ -23,7 +23,7 @@ const DAYS: Problem = (
 );
 const JULIAN: Problem = (
     "may be a Julian date, a number of days",
-    "say --time-format jd (or mjd), or --time-format s if these are seconds",
+    "say --time-format jd (or mjd), d for days since another zero, or --time-format s if these are seconds",
 );
 const COMPACT: Problem = (
     "may be a date whose digits have no marks",
@@ -89,7 +89,7 @@ pub(crate) fn of_numbers(names: &[&str], cells: &[&str], unit: Unit) -> Option<P
             Some(if has_decimals { YEARS } else { WHOLE_YEARS })
         } else if are_even_only(cells, 1440, minutes) || are_even_only(cells, 86_400, seconds) {
             Some(TIME_OF_DAY)
-        } else if are_even_only(cells, i64::MAX, months) {
+        } else if are_even_only(cells, i64::MAX, months) || are_months_by_name(names, cells) {
             Some(MONTHS)
         } else if matches!(names, [name] if SEXAGESIMALS.iter().any(|words| name.to_lowercase().contains(words))) {
             Some(SEXAGESIMAL)
@@ -141,7 +141,7 @@ fn is_called(names: &[&str], known: &[&str]) -> bool {
     words.any(|word| known.contains(&word))
 }
 
-/// Whether a column is named as one of Julian dates and has numbers of their size.
+/// Whether a column is named as one of Julian dates, whatever it counts from, or has numbers of their size.
 fn may_be_julian(names: &[&str], cells: &[&str]) -> bool {
     // Seconds since a start have no quarters alone beyond four weeks.
     let is_share = |cell: &&str| {
@@ -150,8 +150,8 @@ fn may_be_julian(names: &[&str], cells: &[&str]) -> bool {
     };
     let is_since_1941 = || are_within(cells, 2_430_000.0, 2_475_000.0) && cells.iter().any(is_share);
     (is_called(names, &["time", "date"]) && is_since_1941())
-        || (is_called(names, &["jd", "bjd", "hjd", "julian"]) && are_within(cells, 2_300_000.0, 2_600_000.0))
-        || (is_called(names, &["mjd"]) && are_within(cells, 15_000.0, 90_000.0))
+        || (is_called(names, &["julian"]) && are_within(cells, 2_300_000.0, 2_600_000.0))
+        || is_called(names, &["jd", "bjd", "hjd", "mjd", "rjd", "tjd", "btjd", "bkjd"])
 }
 
 /// Whether a column has numbers of the size of days since the year 0, from 1916 to 2190, with times of day, or a name that says so.
@@ -163,7 +163,9 @@ fn may_be_matlab(names: &[&str], cells: &[&str]) -> bool {
 
 /// Whether a column is named as one of years, or the decimals are rounded parts of one.
 fn may_be_years(names: &[&str], cells: &[&str]) -> bool {
-    const WORDS: [&str; 10] = [
+    const WORDS: [&str; 12] = [
+        "date",
+        "datum",
         "year",
         "yr",
         "decimal",
@@ -211,6 +213,13 @@ fn seconds(number: i64) -> Option<i64> {
 fn months(number: i64) -> Option<i64> {
     ((1500..2300).contains(&(number / 100)) && (1..=12).contains(&(number % 100)))
         .then_some(number / 100 * 12 + number % 100)
+}
+
+/// Whether a column that is called so has years and months without marks, also of one year, whose numbers are evenly spaced.
+fn are_months_by_name(names: &[&str], cells: &[&str]) -> bool {
+    let is_month = |cell: &&str| cell.len() == 6 && cell.parse().ok().and_then(months).is_some();
+    is_called(names, &["month", "monat", "yyyymm", "yearmonth", "period", "date", "datum"])
+        && cells.iter().all(is_month)
 }
 
 /// Whether a column of the time has rounded parts of a day, a quarter of an hour apart at most or beginning anew after less than one.

@@ -5,7 +5,12 @@ use crate::time::{Time, Unit};
 
 /// Unit of times that are numbers, as `--time-format` says it.
 const WORDS: [(&str, &[&str]); 7] = [
-    ("s", &["s", "sec", "secs", "second", "seconds"]),
+    (
+        "s",
+        &[
+            "s", "sec", "secs", "second", "seconds", "sekunden", "secondes", "segundos",
+        ],
+    ),
     ("ms", &["ms", "msec", "msecs", "millis", "millisecond", "milliseconds"]),
     (
         "us",
@@ -21,9 +26,9 @@ const WORDS: [(&str, &[&str]); 7] = [
         ],
     ),
     ("ns", &["ns", "nsec", "nsecs", "nanos", "nanosecond", "nanoseconds"]),
-    ("min", &["min", "mins", "minute", "minutes"]),
-    ("h", &["h", "hr", "hrs", "hour", "hours"]),
-    ("d", &["days"]),
+    ("min", &["min", "mins", "minute", "minutes", "minuten", "minutos"]),
+    ("h", &["h", "hr", "hrs", "hour", "hours", "stunden", "heures", "horas"]),
+    ("d", &["days", "tage", "jours"]),
 ];
 
 /// Where the last word of a name begins, and where it ends.
@@ -43,8 +48,17 @@ fn last_word(name: &str) -> (usize, usize) {
     (capital.unwrap_or(begin), end)
 }
 
-/// The unit that the last word of a name states, as `--time-format` says it, and the name without it.
+/// The unit that the last word of a name states, as `--time-format` says it, and the name without it; also before the event that times count
+/// from, as of `hours since start`.
 pub(crate) fn of_name(name: &str) -> Option<(&'static str, &str)> {
+    let before = || {
+        let (unit, event) = name.split_once(" since ")?;
+        event.starts_with(char::is_alphabetic).then(|| of_last_word(unit))?
+    };
+    of_last_word(name).or_else(before)
+}
+
+fn of_last_word(name: &str) -> Option<(&'static str, &str)> {
     let (begin, end) = last_word(name);
     let word = name[begin..end].to_lowercase();
     let in_brackets = name[..begin].ends_with(['(', '[']);
@@ -124,6 +138,9 @@ mod tests {
             ("millis", "ms", ""),
             ("time_min", "min", "time"),
             ("t(s)", "s", "t"),
+            ("hours since start", "h", ""),
+            ("run minutes since last event", "min", "run"),
+            ("Zeit in Stunden", "h", "Zeit"),
         ] {
             assert_eq!(of_name(name), Some((unit, rest)), "{name}");
         }
@@ -138,6 +155,7 @@ mod tests {
             "()",
             "day",
             "ts",
+            "hours since 1970-01-01",
         ] {
             assert_eq!(of_name(name), None, "{name}");
         }
