@@ -226,24 +226,17 @@ impl Table {
         column.map_or(String::new(), |column| recipe::unit(&self.table, *column))
     }
 
-    /// Refuses columns of words, for tasks that compute with cells.
-    pub(crate) fn require_numbers(&self) -> Result<(), Error> {
-        self.require_numbers_where(|_| true)
-    }
-
-    /// Refuses words in the columns, by index, that `has_numbers` names.
-    fn require_numbers_where(&self, has_numbers: impl Fn(usize) -> bool) -> Result<(), Error> {
+    /// Refuses columns of words where `has_numbers` holds of their index, for tasks that compute with cells.
+    pub(crate) fn require_numbers(&self, has_numbers: impl Fn(usize) -> bool) -> Result<(), Error> {
         let has_words = |i: &usize| has_numbers(*i) && matches!(self.kind(*i), Kind::Words | Kind::Text);
-        match (0..self.names.len()).find(has_words) {
-            None => Ok(()),
-            Some(i) => {
-                let problem = format!(
-                    "column `{}` holds words, and numbers are expected: choose columns with --columns, or name gaps with --missing",
-                    crate::say::name(&self.names[i])
-                );
-                Err(Error::content(&self.file, problem))
-            }
-        }
+        let Some(i) = (0..self.names.len()).find(has_words) else {
+            return Ok(());
+        };
+        let problem = format!(
+            "column `{}` holds words, and numbers are expected: choose columns with --columns, or name gaps with --missing",
+            crate::say::name(&self.names[i])
+        );
+        Err(Error::content(&self.file, problem))
     }
 
     /// Takes cells as `<0.25` for limits. Returns whether any column has them.
@@ -286,7 +279,7 @@ impl Table {
     /// # Errors
     /// If rows that were read ahead have other words, or a column has words where the recording has numbers.
     pub(crate) fn use_words(&mut self, columns: &[&fewbits_record::Column]) -> Result<(), Error> {
-        self.require_numbers_where(|i| columns.get(i).is_some_and(|column| words::of(column.unit()).is_none()))?;
+        self.require_numbers(|i| columns.get(i).is_some_and(|column| words::of(column.unit()).is_none()))?;
         self.integers = columns.iter().map(|column| column.integers()).collect();
         recipe::use_words(&mut self.table, &self.batch, columns).map_err(Error::of_table(&self.file))
     }
