@@ -91,7 +91,7 @@ fn sample(options: &DesignOptions, file: &str) -> Result<Prior, Error> {
         let problem = format!("columns {names}: name the one of the sample with --column");
         return Err(Error::content(table.file(), problem));
     }
-    table.require_numbers()?;
+    table.require_numbers(|_| true)?;
     let mut values = Vec::new();
     while let Some((_, cells)) = table.next(TimeBase::Numbered)? {
         values.extend(cells.into_iter().flatten().filter(|value| value.is_finite()));

@@ -4,9 +4,9 @@ use crate::arguments::TableOptions;
 use crate::clock;
 use crate::error::Error;
 use crate::files::is_regular;
-use crate::opening::{chosen, decided, name_of, tell_zeros, time_columns};
+use crate::opening::{chosen, decided, name_of, tell_texts, time_columns};
 use crate::say::say;
-use fewbits_recipes::{table as recipe, times};
+use fewbits_recipes::{table as recipe, times, words};
 use fewbits_record::{Integers, TimeBase};
 use fewbits_table::{Batch, FewCells, Kind, Scale, Side, Time, names};
 
@@ -59,7 +59,7 @@ impl Table {
             table.use_survey(&survey);
             learned = Some(survey);
         }
-        tell_zeros(&table, name_of(options));
+        tell_texts(&table, name_of(options));
         let mut open = Self {
             names: Vec::new(),
             file: name_of(options).to_owned(),
@@ -226,18 +226,17 @@ impl Table {
         column.map_or(String::new(), |column| recipe::unit(&self.table, *column))
     }
 
-    /// Refuses columns of words, for tasks that compute with cells.
-    pub(crate) fn require_numbers(&self) -> Result<(), Error> {
-        match (0..self.names.len()).find(|i| matches!(self.kind(*i), Kind::Words | Kind::Text)) {
-            None => Ok(()),
-            Some(i) => {
-                let problem = format!(
-                    "column `{}` holds words, and numbers are expected: choose columns with --columns, or name gaps with --missing",
-                    crate::say::name(&self.names[i])
-                );
-                Err(Error::content(&self.file, problem))
-            }
-        }
+    /// Refuses columns of words where `has_numbers` holds of their index, for tasks that compute with cells.
+    pub(crate) fn require_numbers(&self, has_numbers: impl Fn(usize) -> bool) -> Result<(), Error> {
+        let has_words = |i: &usize| has_numbers(*i) && matches!(self.kind(*i), Kind::Words | Kind::Text);
+        let Some(i) = (0..self.names.len()).find(has_words) else {
+            return Ok(());
+        };
+        let problem = format!(
+            "column `{}` holds words, and numbers are expected: choose columns with --columns, or name gaps with --missing",
+            crate::say::name(&self.names[i])
+        );
+        Err(Error::content(&self.file, problem))
     }
 
     /// Takes cells as `<0.25` for limits. Returns whether any column has them.
@@ -278,8 +277,9 @@ impl Table {
     /// States the words and the codes of the columns of a recording, so that cells are the numbers that it has for them.
     ///
     /// # Errors
-    /// If rows that were read ahead have other words.
+    /// If rows that were read ahead have other words, or a column has words where the recording has numbers.
     pub(crate) fn use_words(&mut self, columns: &[&fewbits_record::Column]) -> Result<(), Error> {
+        self.require_numbers(|i| columns.get(i).is_some_and(|column| words::of(column.unit()).is_none()))?;
         self.integers = columns.iter().map(|column| column.integers()).collect();
         recipe::use_words(&mut self.table, &self.batch, columns).map_err(Error::of_table(&self.file))
     }

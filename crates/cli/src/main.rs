@@ -8,6 +8,7 @@ mod bench;
 mod bounds;
 mod centre;
 mod clock;
+mod continuing;
 mod design;
 mod design_options;
 mod ending;

@@ -5,7 +5,7 @@ use crate::clock;
 use crate::error::Error;
 use crate::files::is_regular;
 use crate::say::say;
-use fewbits_table::names;
+use fewbits_table::{Kind, names};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -138,29 +138,60 @@ fn chosen_at_once(options: &TableOptions) -> Result<fewbits_table::Table, Error>
     Ok(table)
 }
 
-/// Says once of a file that its first column is taken for the time though nothing but its numbers says so.
-fn tell_first(table: &fewbits_table::Table, file: &str) {
+/// Says a note of a file once, though the file is opened again.
+fn tell_once(file: &str, note: &str) {
     static TOLD: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    let note = format!("note: {file}: {note}");
     let mut told = TOLD.lock().unwrap_or_else(PoisonError::into_inner);
-    if told.insert(file.to_owned())
-        && let Some(first) = table.columns().first()
-    {
-        let name = crate::say::name(&first.name).into_owned();
-        say!(
-            "note: {file}: the first column, `{name}`, is taken for the time, as its numbers increase: --time-column names another"
+    if told.insert(note.clone()) {
+        say!("{note}");
+    }
+}
+
+/// Says that the first column is taken for the time though nothing but its numbers says so.
+fn tell_first(table: &fewbits_table::Table, file: &str) {
+    if let Some(first) = table.columns().first() {
+        let name = crate::say::name(&first.name);
+        tell_once(
+            file,
+            &format!(
+                "the first column, `{name}`, is taken for the time, as its numbers increase: --time-column names another"
+            ),
         );
     }
 }
 
-/// Says of columns of numbers that zeros in front of digits are not kept, as of `007`.
-pub(crate) fn tell_zeros(table: &fewbits_table::Table, file: &str) {
+/// Says of columns of numbers that zeros in front of digits are not kept, as of `007`, and of columns that begin with digits that they are words.
+pub(crate) fn tell_texts(table: &fewbits_table::Table, file: &str) {
     for (column, cell) in table.lost_zeros() {
-        say!(
-            "note: {file}: `{cell}` of the column `{}` is taken for a number, without its zeros in front: --words {} keeps up to 256 different \
-             texts",
-            crate::say::name(&column.name),
-            names::as_argument([fewbits_table::printable(&column.name)])
+        let lost = if cell.starts_with('+') { "its plus" } else { "its zeros" };
+        tell_once(
+            file,
+            &format!(
+                "`{cell}` of the column `{}` is taken for a number, without {lost} in front: --words {} keeps up to 256 different texts",
+                crate::say::name(&column.name),
+                names::as_argument([fewbits_table::printable(&column.name)])
+            ),
         );
+    }
+    let is_amount = |word: &String| {
+        let digits = word.trim_start_matches(['+', '-', '~', '[', '{', '(', '<', '>']);
+        digits.starts_with(|c: char| c.is_ascii_digit())
+            && !word.bytes().all(|c| c.is_ascii_alphanumeric() || c == b'.')
+    };
+    for i in table.selected().iter().copied() {
+        let words = if table.columns()[i].kind == Kind::Words {
+            table.words(i)
+        } else {
+            &[]
+        };
+        if let (Some(word), true) = (words.first(), words.iter().all(is_amount)) {
+            let (name, word) = (crate::say::name(&table.columns()[i].name), fewbits_table::printable(word));
+            tell_once(
+                file,
+                &format!("the column `{name}` is kept as words, as `{word}`: if these are numbers, convert them"),
+            );
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! `fewbits pack`: converts a table to a recording.
 
 use crate::arguments::{BoundOptions, PackOptions, TableOptions};
+use crate::continuing::{check_clock, own_tolerance, tell_earlier};
 use crate::error::Error;
 use crate::files::is_regular;
 use crate::identity::Identity;
@@ -11,11 +12,11 @@ use crate::rows::TableRows;
 use crate::say::{self, say};
 use crate::single_pass::{is_written_beside, readable_once};
 use crate::target::{self, Target};
-use crate::{Ending, bounds, clock};
+use crate::{Ending, bounds};
 use fewbits_recipes::bounds::exact;
-use fewbits_recipes::{times, words};
+use fewbits_recipes::words;
 use fewbits_record::{Bound, Column, Effort, Playback, Recorder, Schema, TimeBase};
-use fewbits_table::{Kind, Scale, Time, names};
+use fewbits_table::{Kind, names};
 use serde::Serialize;
 use std::fs::File;
 use std::io::Write;
@@ -181,22 +182,6 @@ fn fill<W: Write>(
     Ok((sink, count, None))
 }
 
-/// The tolerance of a recording's times, as `--time` takes it.
-pub(crate) fn own_tolerance(time: TimeBase) -> String {
-    match time {
-        TimeBase::Clock {
-            tolerance: ticks @ 1..,
-            decimals,
-            ..
-        } if decimals <= clock::NANOSECONDS => {
-            // A tick was reserved for decimals beyond one.
-            let tick = 10_u64.pow(u32::from(clock::NANOSECONDS - decimals));
-            format!("±{}ns", ticks.saturating_add(1).saturating_mul(tick))
-        }
-        _ => "exact".to_owned(),
-    }
-}
-
 /// The options with which a table continues a recording: its columns in their order, and its times.
 fn continued(options: &TableOptions, schema: &Schema, file: &str) -> Result<TableOptions, Error> {
     let has_time = schema.time() != TimeBase::Numbered;
@@ -212,35 +197,6 @@ fn continued(options: &TableOptions, schema: &Schema, file: &str) -> Result<Tabl
     })
 }
 
-/// Refuses times that are others than those of the recording. `begin`: its first tick. `mend`: what to do if no option helps.
-pub(crate) fn check_clock(
-    table: &mut Table,
-    time: TimeBase,
-    begin: Option<i64>,
-    file: &str,
-    mend: &str,
-) -> Result<(), Error> {
-    let (TimeBase::Clock { decimals, format, .. }, Some((scale, first))) = (time, table.first_time()?) else {
-        return Ok(());
-    };
-    // Seconds since 1970, not those of a run or of a day.
-    let is_dated = |time: Time| time.seconds() >= 1e8;
-    let has_dates = begin.is_none_or(|tick| is_dated(Time::from_ticks(tick, decimals)));
-    let problem = match (scale, times::scale(format)) {
-        (own, known) if own == known => return Ok(()),
-        (Scale::Seconds, Scale::Utc) if first.is_none_or(is_dated) => return Ok(()),
-        (Scale::Utc, Scale::Seconds) if has_dates => return Ok(()),
-        (Scale::Local, known) if known == Scale::Utc || has_dates => {
-            "without a zone, and those of {} are UTC: say --time-zone UTC, or their zone"
-        }
-        (Scale::Local, _) => "dates, and those of {} are seconds: ",
-        (Scale::Utc, _) => "UTC, and those of {} have no zone or date: ",
-        _ => "seconds, and those of {} are dates: ",
-    };
-    let mend = if problem.ends_with(' ') { mend } else { "" };
-    Err(Error::content(table.file(), format!("its times are {}{mend}", problem.replace("{}", file))))
-}
-
 /// Continues a recording. A table that is refused, a kill and a full disk leave it as it was, and of two commands the second is refused.
 fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, Option<Error>), Error> {
     let file = path.display().to_string();
@@ -249,7 +205,7 @@ fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, O
     }
     let playback = Playback::open(path).map_err(Error::recording(&file))?;
     let schema = playback.schema().clone();
-    let begin = playback.ticks().map_err(Error::recording(&file))?.map(|ticks| ticks.0);
+    let (begin, end) = playback.ticks().map_err(Error::recording(&file))?.unzip();
     drop(playback);
     let table_options = continued(&options.table, &schema, &file)?;
     let open = || -> Result<Table, Error> {
@@ -269,6 +225,7 @@ fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, O
     };
     let mut table = open()?;
     check_clock(&mut table, schema.time(), begin, &file, "pack the table into a file of its own")?;
+    tell_earlier(&mut table, schema.time(), end, &file)?;
     // A live table is appended as it comes: its rows cannot be read again.
     if !target::is_live() {
         TableRows::new(open()?, schema.time()).check()?;

@@ -1,11 +1,11 @@
 //! `fewbits verify`: checks a recording against its table and error bounds.
 
 use crate::arguments::{TableOptions, VerifyOptions};
+use crate::continuing::{check_clock, own_tolerance};
 use crate::error::Error;
 use crate::files::is_regular;
 use crate::input::Table;
 use crate::opening::day_order;
-use crate::pack::{check_clock, own_tolerance};
 use crate::rows::TableRows;
 use crate::{Ending, clock, numbers, output, recording, say};
 use fewbits_recipes::names;

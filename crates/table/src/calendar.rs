@@ -10,71 +10,23 @@ pub(crate) const NO_SUCH_DATE: Problem = (
     "mend the cell, say the order with --time-format dmy, mdy or ymd, or leave such rows out with --skip-bad",
 );
 
-const MONTHS: [&str; 12] = [
-    "january",
-    "february",
-    "march",
-    "april",
-    "may",
-    "june",
-    "july",
-    "august",
-    "september",
-    "october",
-    "november",
-    "december",
-];
-const DAYS: [&str; 7] = [
-    "monday",
-    "tuesday",
-    "wednesday",
-    "thursday",
-    "friday",
-    "saturday",
-    "sunday",
-];
+const MONTHS: &str = "january|february|march|april|may|june|july|august|september|october|november|december";
+const DAYS: &str = "monday|tuesday|wednesday|thursday|friday|saturday|sunday";
 
 /// Beginnings of the names of months in other languages: German, Dutch, Swedish, French, Spanish, Italian, Portuguese, Russian.
-const OTHERS: [(&str, usize); 39] = [
-    ("янв", 0),
-    ("фев", 1),
-    ("мар", 2),
-    ("апр", 3),
-    ("май", 4),
-    ("мая", 4),
-    ("июн", 5),
-    ("июл", 6),
-    ("авг", 7),
-    ("сен", 8),
-    ("окт", 9),
-    ("ноя", 10),
-    ("дек", 11),
-    ("ene", 0),
-    ("gen", 0),
-    ("fév", 1),
-    ("fev", 1),
-    ("mär", 2),
-    ("maa", 2),
-    ("mrt", 2),
-    ("avr", 3),
-    ("abr", 3),
-    ("mai", 4),
-    ("maj", 4),
-    ("mei", 4),
-    ("mag", 4),
-    ("juin", 5),
-    ("giu", 5),
-    ("juil", 6),
-    ("lug", 6),
-    ("aoû", 7),
-    ("aou", 7),
-    ("ago", 7),
-    ("set", 8),
-    ("okt", 9),
-    ("out", 9),
-    ("ott", 9),
-    ("dez", 11),
-    ("dic", 11),
+const OTHERS: [&str; 12] = [
+    "янв|ene|gen",
+    "фев|fév|fev",
+    "мар|mär|maa|mrt",
+    "апр|avr|abr",
+    "май|мая|mai|maj|mei|mag",
+    "июн|juin|giu",
+    "июл|juil|lug",
+    "авг|aoû|aou|ago",
+    "сен|set",
+    "окт|okt|out|ott",
+    "ноя",
+    "дек|dez|dic",
 ];
 
 /// Reads digits: their value and what follows.
@@ -85,14 +37,16 @@ pub(crate) fn digits(text: &str, at_most: usize) -> Option<(i64, usize, &str)> {
 }
 
 /// The place of a word in a list of names, by three letters or more of it.
-fn named(word: &str, names: &[&str]) -> Option<usize> {
+fn named(word: &str, names: &str) -> Option<usize> {
     let word = word.trim_end_matches('.').to_lowercase();
-    names.iter().position(|name| word.len() >= 3 && name.starts_with(&word))
+    names
+        .split('|')
+        .position(|name| word.len() >= 3 && name.starts_with(&word))
 }
 
 /// The number of a month, from 0, by its name or three letters of it.
 pub(crate) fn month_named(word: &str) -> Option<usize> {
-    named(word, &MONTHS).or_else(|| {
+    named(word, MONTHS).or_else(|| {
         let word = word.trim_end_matches('.').to_lowercase();
         let word = if word == "déc" || word.starts_with("décem") {
             "dez"
@@ -106,19 +60,16 @@ pub(crate) fn month_named(word: &str) -> Option<usize> {
                 "juli", "julho", "augus", "sept", "octu", "octo", "outu", "novem", "decem", "desem",
             ];
             let begin = known.iter().find(|begin| word.starts_with(*begin))?;
-            MONTHS.iter().position(|name| name.starts_with(&begin[..3]))
+            MONTHS.split('|').position(|name| name.starts_with(&begin[..3]))
         };
-        OTHERS
-            .iter()
-            .find(|(begin, _)| word.starts_with(begin))
-            .map(|(_, month)| *month)
-            .or_else(like)
+        let begins = |begins: &&str| begins.split('|').any(|begin| word.starts_with(begin));
+        OTHERS.iter().position(begins).or_else(like)
     })
 }
 
 /// Whether a word names a day of the week.
 pub(crate) fn is_day_name(word: &str) -> bool {
-    named(word, &DAYS).is_some()
+    named(word, DAYS).is_some()
 }
 
 /// A date.

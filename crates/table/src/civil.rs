@@ -3,7 +3,7 @@
 pub(crate) use crate::calendar::{NO_SUCH_DATE, Problem, digits};
 use crate::calendar::{checked, day_of_year, month_named, of_week};
 use crate::time::DECIMALS;
-use crate::worded::{arranged, of_east_asia};
+use crate::worded::{arranged, of_east_asia, of_period};
 pub(crate) use crate::worded::{is_ratio, undressed};
 use crate::zones::zone_of;
 pub(crate) use crate::zones::{Zone, offset};
@@ -39,7 +39,11 @@ pub(crate) fn written(text: &str, order: Order) -> Option<Written> {
     let one = |text: &str| {
         let worded = || parts(&arranged(text)?, Order::Ymd);
         let of_east_asia = || parts(&of_east_asia(text)?, Order::Ymd);
-        parts(text, order).or_else(worded).or_else(of_east_asia)
+        let of_period = || parts(&of_period(text)?, Order::Ymd);
+        parts(text, order)
+            .or_else(of_period)
+            .or_else(worded)
+            .or_else(of_east_asia)
     };
     let found = one(text);
     if found.as_ref().is_some_and(|found| found.zone != Zone::Unknown) {

@@ -10,10 +10,11 @@ use crate::guess;
 use crate::interval;
 use crate::known;
 use crate::named::{NAMES, OF_DAY, is_exact_name, is_time_name, starts_an_interval};
+use crate::names::is_one_of;
 use crate::parts::{calendar, monthly, of_day_parts, parts, weeks};
 use crate::sample::{Refused, dated_hours, majority, with_stated_unit};
 use crate::stated;
-use crate::time::{Scale, Time, Unit};
+use crate::time::{Scale, Unit};
 use crate::written::{self, Clock, Order, Syntax};
 use std::borrow::Cow;
 
@@ -57,7 +58,7 @@ fn says(column: &Column, sample: &[String], has_named: bool) -> Says {
         let is_short = |cell: &&str| cell.len() <= 6 && cell.bytes().all(|c| c.is_ascii_digit());
         // Also with the zone behind each, as `2130 UTC`.
         let is_zoned = |cell: &&str| cell.len() == 8 && cell.ends_with(" UTC") && is_short(&&cell[..4]);
-        let is_named = || OF_DAY.contains(&name.as_str()) || name.ends_with(" utc");
+        let is_named = || is_one_of(OF_DAY, &name) || name.ends_with(" utc");
         let is_of_day = is_named() && (cells.iter().all(is_short) || cells.iter().all(is_zoned));
         return if is_of_day { Says::OfDay } else { Says::Nothing };
     }
@@ -92,7 +93,7 @@ pub(crate) fn guess(
             .position(|column| column.own_name == "Timestamp")
             .map(|column| vec![column]);
     }
-    let has_named = NAMES.iter().any(|name| named(name).is_some());
+    let has_named = NAMES.split('|').any(|name| named(name).is_some());
     let said: Vec<Says> = columns
         .iter()
         .zip(samples)
@@ -107,7 +108,7 @@ pub(crate) fn guess(
             .find(|clock| clock.abs_diff(*day) == 1 && (clocks.len() == 1 || is_start(clock)));
         let by_name = clocks
             .iter()
-            .find(|clock| OF_DAY.contains(&columns[**clock].own_name.to_lowercase().as_str()));
+            .find(|clock| is_one_of(OF_DAY, &columns[**clock].own_name.to_lowercase()));
         if let Some(clock) = by_name.or(beside) {
             return Some(vec![*day, *clock]);
         }
@@ -138,7 +139,7 @@ pub(crate) fn guess(
         several => {
             let by_name = several
                 .iter()
-                .find(|i| NAMES.contains(&columns[**i].own_name.to_lowercase().as_str()));
+                .find(|i| is_one_of(NAMES, &columns[**i].own_name.to_lowercase()));
             let by_name = by_name.or(several.iter().find(|i| is_time_name(&columns[**i].own_name)));
             return Some(vec![by_name.copied().unwrap_or(several[0])]);
         }
@@ -155,9 +156,9 @@ pub(crate) fn guess(
             .filter(may_be)
     };
     let exact = NAMES
-        .iter()
+        .split('|')
         .find_map(|name| named(name).filter(may_be))
-        .or_else(|| NAMES.iter().find_map(|name| with_unit(name)));
+        .or_else(|| NAMES.split('|').find_map(with_unit));
     let like = || {
         columns
             .iter()
@@ -183,7 +184,7 @@ pub(crate) fn shared_date(columns: &[Column], samples: &[&[String]], time: &[usi
         let mut words = name.split(|c: char| !c.is_alphanumeric());
         let is_size = |cell: &String| cell.parse().is_ok_and(|x: f64| (0.0..=240_000.0).contains(&x));
         i != date
-            && words.any(|word| OF_DAY.contains(&word) || word == "hour" || word == "hours")
+            && words.any(|word| is_one_of(OF_DAY, word) || word == "hour" || word == "hours")
             && !samples[*i].is_empty()
             && samples[*i].iter().all(is_size)
     };
@@ -262,18 +263,11 @@ pub(crate) fn clock(
     };
     let stated = zero.map(|(unit, zero)| (Syntax::Since(unit, zero), Scale::Utc));
     if let Some((syntax, scale)) = stated.or_else(|| dialect.time_format.as_deref().and_then(written::since)) {
+        let zone = zone_text.as_deref().and_then(written::zone);
         return Ok(Clock {
-            syntax,
-            zone: zone_text
-                .as_deref()
-                .and_then(written::zone)
-                .filter(|_| scale == Scale::Local),
-            scale,
-            takes_leap_seconds: false,
-            cuts: false,
-            parts_behind: None,
+            zone: zone.filter(|_| scale == Scale::Local),
             marks,
-            largest: Time(i128::MAX),
+            ..Clock::new(syntax, scale)
         });
     }
     let largest = doubts::largest(&cells);
@@ -310,25 +304,17 @@ pub(crate) fn clock(
         _ if has_offset || zone_text.is_some() => Scale::Utc,
         _ => Scale::Local,
     };
-    let beyond = match (&syntax, &dialect.time_format) {
-        (Syntax::Number(unit), None) => doubts::most(&cells, *unit),
-        _ => Time(i128::MAX),
-    };
-    if let (Syntax::Number(unit), None) = (&syntax, &dialect.time_format)
-        && *unit != Unit::Seconds
-    {
-        let text = ["s", "ms", "us", "ns"][usize::from(unit.decimals() / 3)];
-        dialect.time_format = Some(text.to_owned());
-    }
-    let zone = zone_text.as_deref().and_then(written::zone);
-    Ok(Clock {
-        syntax,
-        zone,
-        scale,
-        takes_leap_seconds: false,
-        cuts: false,
-        parts_behind: None,
+    let mut clock = Clock {
+        zone: zone_text.as_deref().and_then(written::zone),
         marks,
-        largest: beyond,
-    })
+        ..Clock::new(syntax, scale)
+    };
+    if let (Syntax::Number(unit), None) = (&clock.syntax, &dialect.time_format) {
+        clock.largest = doubts::most(&cells, *unit);
+        if *unit != Unit::Seconds {
+            let text = ["s", "ms", "us", "ns"][usize::from(unit.decimals() / 3)];
+            dialect.time_format = Some(text.to_owned());
+        }
+    }
+    Ok(clock)
 }

@@ -5,47 +5,12 @@
 
 use crate::column::MAX_WORDS;
 use crate::hint::{is_padded, without_unit};
+use crate::names;
 use crate::number::{self, Syntax};
 
 /// Words of names of columns that hold identifiers.
-const NAMES: [&str; 36] = [
-    "id",
-    "ids",
-    "uid",
-    "guid",
-    "code",
-    "codes",
-    "serial",
-    "sn",
-    "zip",
-    "plz",
-    "postcode",
-    "postal",
-    "address",
-    "addr",
-    "station",
-    "stations",
-    "site",
-    "device",
-    "tag",
-    "imei",
-    "iccid",
-    "imsi",
-    "mac",
-    "key",
-    "phone",
-    "tel",
-    "ticket",
-    "batch",
-    "lot",
-    "barcode",
-    "ean",
-    "upc",
-    "wmo",
-    "fips",
-    "seriennummer",
-    "artikelnummer",
-];
+const NAMES: &str = "id|ids|uid|guid|code|codes|serial|sn|zip|plz|postcode|postal|address|addr|station|stations|site|device|tag|\
+    imei|iccid|imsi|mac|key|phone|tel|ticket|batch|lot|barcode|ean|upc|wmo|fips|seriennummer|artikelnummer";
 /// Least number of different cells of which all have one unit behind them.
 const FEWEST: usize = 4;
 
@@ -60,7 +25,7 @@ pub(crate) fn is_named(name: &str) -> bool {
         was_small = c.is_lowercase();
         words.extend(c.to_lowercase().filter(|c| c.is_alphanumeric()));
     }
-    words.split(' ').any(|word| NAMES.contains(&word))
+    words.split(' ').any(|word| names::is_one_of(NAMES, word))
 }
 
 /// Whether texts are digits of binary numbers, all of one length of four or more.

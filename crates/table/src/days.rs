@@ -4,6 +4,7 @@ use crate::civil;
 use crate::hint::hint;
 use crate::interval;
 use crate::named::OF_DAY;
+use crate::names::is_one_of;
 use crate::number as numbers;
 use crate::parts::Part;
 use crate::time::{SECOND, Time, Unit};
@@ -55,25 +56,15 @@ fn are_minutes(names: &[&str], cells: &[&str]) -> bool {
 
 /// Whether a column of the time has numbers of so many digits, some behind a zero, as `095800`, which counts do not have.
 fn are_digits_of_time(names: &[&str], cells: &[&str], digits: usize) -> bool {
-    matches!(names, [name] if OF_DAY.contains(&name.to_lowercase().as_str()))
+    matches!(names, [name] if is_one_of(OF_DAY, &name.to_lowercase()))
         && cells.iter().all(|cell| cell.len() == digits)
         && cells.iter().any(|cell| cell.starts_with('0'))
 }
 
 /// Whether a column is named as one of times of day without marks, as receivers of satellites write them: `213000.50`.
 fn is_of_day_name(names: &[&str]) -> bool {
-    const WORDS: [&str; 9] = [
-        "utc",
-        "utc_time",
-        "utc time",
-        "time_utc",
-        "utctime",
-        "gps_time",
-        "gpstime",
-        "hhmmss",
-        "hhmmss.ss",
-    ];
-    matches!(names, [name] if WORDS.contains(&name.to_lowercase().as_str()))
+    const WORDS: &str = "utc|utc_time|utc time|time_utc|utctime|gps_time|gpstime|hhmmss|hhmmss.ss";
+    matches!(names, [name] if is_one_of(WORDS, &name.to_lowercase()))
 }
 
 /// Whether a column of dates has numbers of the size of days since 1900.

@@ -2,7 +2,7 @@
 
 use crate::delimiter::{cells, delimiter, modal, names_its_rows, splits_its_times};
 use crate::dialect::{Delimiter, Dialect};
-use crate::error::{Error, Place};
+use crate::error::Error;
 use crate::head::Head;
 use crate::lines::{MAX_ROW_LINES, Split};
 use crate::{above, guess, known, limits, marks, missing, number};
@@ -116,11 +116,11 @@ pub(crate) fn detect(head: &Head, dialect: &mut Dialect) -> Result<Layout, Error
     if dialect.decimal.is_none() {
         let is_comma = delimiter != Delimiter::Byte(b',') && marks::has_decimal_commas(&rows);
         if let (false, None, Some((line, cell))) = (is_comma, dialect.thousands, marks::doubtful_groups(&rows)) {
-            return Err(Error::Line {
-                place: Place { line, row: 0 },
-                problem: format!("`{cell}` may have a point between groups of digits, or before decimals"),
-                mend: "say --thousands . (and --decimal ,) for groups, or --decimal . for decimals",
-            });
+            return Err(Error::line(
+                line,
+                format!("`{cell}` may have a point between groups of digits, or before decimals"),
+                "say --thousands . (and --decimal ,) for groups, or --decimal . for decimals",
+            ));
         }
         dialect.decimal = Some(if is_comma { ',' } else { '.' });
     }
@@ -249,14 +249,11 @@ fn layout(
     }
     let data = looks.iter().position(is_data);
     match data {
-        Some(0) => Err(Error::Line {
-            place: Place {
-                line: *first_number,
-                row: 0,
-            },
-            problem: "there is no line of names: the first line is a row of numbers".to_owned(),
-            mend: "say --no-header if it is a row, or --skip 0 if these are the names",
-        }),
+        Some(0) => Err(Error::line(
+            *first_number,
+            "there is no line of names: the first line is a row of numbers",
+            "say --no-header if it is a row, or --skip 0 if these are the names",
+        )),
         Some(data) => {
             let mut header = data - 1;
             // A row of gaps is no line of names.
@@ -320,17 +317,14 @@ fn layout(
                 header -= 1;
             }
             if count > 1 && rows[header].1.len() == 1 {
-                return Err(Error::Line {
-                    place: Place {
-                        line: rows[data].0,
-                        row: 0,
-                    },
-                    problem: format!(
+                return Err(Error::line(
+                    rows[data].0,
+                    format!(
                         "there is no line of names: this row has {count} cells, and the line above has 1 ({} lines stand above)",
                         lines_before(rows[data].0)
                     ),
-                    mend: "say --no-header, and --skip with the number of lines above; or what separates cells with --delimiter",
-                });
+                    "say --no-header, and --skip with the number of lines above; or what separates cells with --delimiter",
+                ));
             }
             let is_numeric = |look: &Look| matches!(look, Look::Number | Look::Time);
             let may_be_row = |i: usize| {
@@ -369,11 +363,11 @@ fn layout(
 
 /// Rows above the line of names, which would be left out as settings are.
 fn several_tables(line: u64) -> Error {
-    Error::Line {
-        place: Place { line, row: 0 },
-        problem: "rows of numbers stand above the line of names, as if this were a table before another".to_owned(),
-        mend: "make a file of each table; if these are settings, say --skip with the number of lines above the names",
-    }
+    Error::line(
+        line,
+        "rows of numbers stand above the line of names, as if this were a table before another",
+        "make a file of each table; if these are settings, say --skip with the number of lines above the names",
+    )
 }
 
 fn from_header(rows: &[(u64, Vec<String>)], header: usize, dialect: &mut Dialect) -> Layout {

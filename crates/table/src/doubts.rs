@@ -2,6 +2,7 @@
 
 use crate::days::{may_be_compact, may_be_days};
 use crate::named::NAMES;
+use crate::names::is_one_of;
 use crate::time::{SECOND, Time, Unit};
 use crate::written::{FAR, Problem};
 
@@ -23,7 +24,7 @@ const DAYS: Problem = (
 );
 const JULIAN: Problem = (
     "may be a Julian date, a number of days",
-    "say --time-format jd (or mjd), or --time-format s if these are seconds",
+    "say --time-format jd (or mjd), d for days since another zero, or --time-format s if these are seconds",
 );
 const COMPACT: Problem = (
     "may be a date whose digits have no marks",
@@ -89,7 +90,7 @@ pub(crate) fn of_numbers(names: &[&str], cells: &[&str], unit: Unit) -> Option<P
             Some(if has_decimals { YEARS } else { WHOLE_YEARS })
         } else if are_even_only(cells, 1440, minutes) || are_even_only(cells, 86_400, seconds) {
             Some(TIME_OF_DAY)
-        } else if are_even_only(cells, i64::MAX, months) {
+        } else if are_even_only(cells, i64::MAX, months) || are_months_by_name(names, cells) {
             Some(MONTHS)
         } else if matches!(names, [name] if SEXAGESIMALS.iter().any(|words| name.to_lowercase().contains(words))) {
             Some(SEXAGESIMAL)
@@ -134,14 +135,14 @@ fn are_within(cells: &[&str], low: f64, high: f64) -> bool {
 }
 
 /// Whether a word of the only name is one of these.
-fn is_called(names: &[&str], known: &[&str]) -> bool {
+fn is_called(names: &[&str], known: &str) -> bool {
     let [name] = names else { return false };
     let name = name.to_lowercase();
     let mut words = name.split(|c: char| !c.is_alphanumeric());
-    words.any(|word| known.contains(&word))
+    words.any(|word| is_one_of(known, word))
 }
 
-/// Whether a column is named as one of Julian dates and has numbers of their size.
+/// Whether a column is named as one of Julian dates, whatever it counts from, or has numbers of their size.
 fn may_be_julian(names: &[&str], cells: &[&str]) -> bool {
     // Seconds since a start have no quarters alone beyond four weeks.
     let is_share = |cell: &&str| {
@@ -149,35 +150,24 @@ fn may_be_julian(names: &[&str], cells: &[&str]) -> bool {
             .is_ok_and(|x: f64| x.fract() != 0.0 && (2.0 * x).fract() == 0.0)
     };
     let is_since_1941 = || are_within(cells, 2_430_000.0, 2_475_000.0) && cells.iter().any(is_share);
-    (is_called(names, &["time", "date"]) && is_since_1941())
-        || (is_called(names, &["jd", "bjd", "hjd", "julian"]) && are_within(cells, 2_300_000.0, 2_600_000.0))
-        || (is_called(names, &["mjd"]) && are_within(cells, 15_000.0, 90_000.0))
+    (is_called(names, "time|date") && is_since_1941())
+        || (is_called(names, "julian") && are_within(cells, 2_300_000.0, 2_600_000.0))
+        || is_called(names, "jd|bjd|hjd|mjd|rjd|tjd|btjd|bkjd")
 }
 
 /// Whether a column has numbers of the size of days since the year 0, from 1916 to 2190, with times of day, or a name that says so.
 fn may_be_matlab(names: &[&str], cells: &[&str]) -> bool {
-    let is_named = is_called(names, &["datenum", "matlab", "date", "datum"]);
+    let is_named = is_called(names, "datenum|matlab|date|datum");
     let has_share = cells.iter().any(|cell| decimals(cell) >= 5);
     (is_named || has_share) && are_within(cells, 700_000.0, 800_000.0)
 }
 
 /// Whether a column is named as one of years, or the decimals are rounded parts of one.
 fn may_be_years(names: &[&str], cells: &[&str]) -> bool {
-    const WORDS: [&str; 10] = [
-        "year",
-        "yr",
-        "decimal",
-        "dec",
-        "decyear",
-        "decimalyear",
-        "yeardecimal",
-        "jahr",
-        "anno",
-        "frac",
-    ];
+    const WORDS: &str = "date|datum|year|yr|decimal|dec|decyear|decimalyear|yeardecimal|jahr|anno|frac";
     // Halves of months, and of days.
     let are_parts = || [24, 730, 732].iter().any(|parts| are_rounded_parts(cells, *parts));
-    are_within(cells, 1500.0, 2300.0) && (is_called(names, &WORDS) || are_parts())
+    are_within(cells, 1500.0, 2300.0) && (is_called(names, WORDS) || are_parts())
 }
 
 /// Fewest numbers of which the distances are compared.
@@ -213,9 +203,16 @@ fn months(number: i64) -> Option<i64> {
         .then_some(number / 100 * 12 + number % 100)
 }
 
+/// Whether a column that is called so has years and months without marks, also of one year, whose numbers are evenly spaced.
+fn are_months_by_name(names: &[&str], cells: &[&str]) -> bool {
+    let is_month = |cell: &&str| cell.len() == 6 && cell.parse().ok().and_then(months).is_some();
+    is_called(names, "month|monat|yyyymm|yearmonth|period|date|datum") && cells.iter().all(is_month)
+}
+
 /// Whether a column of the time has rounded parts of a day, a quarter of an hour apart at most or beginning anew after less than one.
 fn may_be_parts_of_a_day(names: &[&str], cells: &[&str]) -> bool {
-    let is_time = matches!(names, [name] if NAMES.contains(&name.to_lowercase().as_str()) || name.to_lowercase().contains("time"));
+    let is_time =
+        matches!(names, [name] if is_one_of(NAMES, &name.to_lowercase()) || name.to_lowercase().contains("time"));
     if !is_time || !are_within(cells, 0.0, 1.0 + 1e-9) {
         return false;
     }

@@ -152,6 +152,15 @@ impl Error {
         }
     }
 
+    /// The refusal of a line that is no row yet.
+    pub(crate) fn line(line: u64, problem: impl Into<String>, mend: &'static str) -> Self {
+        Self::Line {
+            place: Place { line, row: 0 },
+            problem: problem.into(),
+            mend,
+        }
+    }
+
     /// Whether dates may have the day or the month first, which rows behind the first ones may decide: [`Profile::day_order`].
     ///
     /// [`Profile::day_order`]: crate::Profile::day_order

@@ -6,6 +6,7 @@
 use crate::dialect::Dialect;
 use crate::head::Head;
 use crate::lines::MAX_LINE;
+use crate::names::is_one_of;
 use crate::{guess, number};
 use std::io::{BufRead, Cursor, Read};
 
@@ -28,32 +29,8 @@ const ALL: [Frame; 5] = [Frame::Bars, Frame::Boxes, Frame::Latex, Frame::Quotes,
 /// The separator of records of RFC 7464.
 const RECORD: char = '\u{1e}';
 /// Names of types that programs write below the names of columns.
-const TYPES: [&str; 24] = [
-    "i8",
-    "i16",
-    "i32",
-    "i64",
-    "u8",
-    "u16",
-    "u32",
-    "u64",
-    "f32",
-    "f64",
-    "str",
-    "bool",
-    "int8",
-    "int16",
-    "int32",
-    "int64",
-    "float",
-    "double",
-    "varchar",
-    "boolean",
-    "date",
-    "timestamp",
-    "time",
-    "cat",
-];
+const TYPES: &str = "i8|i16|i32|i64|u8|u16|u32|u64|f32|f64|str|bool|int8|int16|int32|int64|float|double|varchar|boolean|date|\
+    timestamp|time|cat";
 
 /// The frame of the first lines; `None` if they have none, or the user said another delimiter.
 pub(crate) fn find(head: &Head, said: &Dialect) -> Option<Frame> {
@@ -190,7 +167,7 @@ fn bare<'a>(cells: impl Iterator<Item = &'a str>) -> String {
             .unwrap_or(cell)
     };
     let cells: Vec<&str> = cells.map(marked).collect();
-    let is_type = |cell: &&str| TYPES.contains(&cell.split('[').next().unwrap_or(cell));
+    let is_type = |cell: &&str| is_one_of(TYPES, cell.split('[').next().unwrap_or(cell));
     if cells.iter().all(|cell| *cell == "---") || cells.iter().all(is_type) {
         return String::new();
     }

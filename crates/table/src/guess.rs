@@ -1,7 +1,8 @@
 //! How the times of a column are written, by its cells.
 
 use crate::civil::{self, Zone, digits, is_compact};
-use crate::time::{Scale, Time, Unit};
+use crate::time::{Scale, Unit};
+use crate::worded::of_period;
 pub(crate) use crate::worded::three;
 use crate::written::{Clock, NAMED_ZONE, Order, Problem, Syntax};
 
@@ -35,14 +36,9 @@ pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Doubt>> {
     let bare: Vec<&str> = cells.iter().map(|cell| civil::undressed(cell)).collect();
     let cells = bare.as_slice();
     let clock = |syntax: Syntax, scale| Clock {
-        syntax,
-        zone: None,
-        scale,
         takes_leap_seconds: true,
         cuts: true,
-        parts_behind: None,
-        marks: None,
-        largest: Time(i128::MAX),
+        ..Clock::new(syntax, scale)
     };
     let all = |syntax: Syntax| {
         let utc = clock(syntax.clone(), Scale::Utc);
@@ -83,7 +79,7 @@ pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Doubt>> {
     }
     let is_worded = cells
         .iter()
-        .all(|cell| cell.trim().chars().take(7).any(|c| c.is_alphabetic() && c != 'T'));
+        .all(|cell| of_period(cell).is_some() || cell.trim().chars().take(7).any(|c| c.is_alphabetic() && c != 'T'));
     match (dmy, mdy) {
         (true, true) if is_dotted || is_worded => Some(Ok(Syntax::Date(Order::Dmy))),
         (true, true) => Some(Err(Doubt::DayOrMonth)),
@@ -149,8 +145,9 @@ pub(crate) fn has_offset(text: &str, order: Order) -> bool {
 /// Whether a text looks like a time that is no plain number.
 pub(crate) fn looks_like_time(text: &str) -> bool {
     let text = civil::undressed(text);
-    // A date has digits, and a year and a month alone may be anything.
+    // A date has digits, and a year and a month, or a quarter, alone may be anything.
     !(text.len() == 7 && text.as_bytes()[4] == b'-')
+        && of_period(text).is_none()
         && text.bytes().any(|c| c.is_ascii_digit())
         && text.starts_with(|c: char| c.is_ascii_alphanumeric())
         // Behind the name of a day or a month stand further words.

@@ -70,7 +70,10 @@ pub(crate) fn hint(text: &str) -> &'static str {
         "if it is an error of a spreadsheet, make it a gap with --missing"
     } else if text.ends_with(FLAGS) {
         "if a mark stands behind the number, --strip-units cuts it off"
-    } else if text.ends_with(SYMBOLS) || text.ends_with(|c: char| c.is_alphabetic()) && !text.contains('x') {
+    } else if text.ends_with(SYMBOLS)
+        || text.ends_with(CURRENCIES)
+        || text.ends_with(|c: char| c.is_alphabetic()) && !text.contains('x')
+    {
         "if a unit stands behind the number, say --strip-units"
     } else if text.starts_with("0x") || text.starts_with("0X") {
         "hexadecimal numbers are not read: convert the column, or leave it out with --without"
@@ -88,9 +91,10 @@ fn begins_with_zeros(text: &str) -> bool {
 /// Beginnings of units that are no letters: per cent, per mille, degrees, micro, inches, minutes.
 const SYMBOLS: [char; 7] = ['%', '‰', '°', 'µ', '"', '″', '′'];
 
-/// Whether a text is digits alone with a zero in front, as `007`.
+/// Whether a text is digits alone with a zero in front, as `007`, or the plus of a number of a telephone.
 pub(crate) fn is_padded(text: &str) -> bool {
-    text.len() > 1 && text.starts_with('0') && text.bytes().all(|c| c.is_ascii_digit())
+    let digits = text.strip_prefix('+').filter(|digits| digits.len() > 8).unwrap_or(text);
+    text.len() > 1 && (text.starts_with('0') || digits.len() < text.len()) && digits.bytes().all(|c| c.is_ascii_digit())
 }
 
 /// Whether a text is a version or an address, as `1.10.2` and `10.0.0.1`: points between digits, which are no groups of three.

@@ -1,7 +1,7 @@
 //! Lines of InfluxDB's line protocol as rows: `weather,site=roof temperature=82.5,ok=true 1465839830100400200` has the columns `measurement`,
 //! `site`, `temperature`, `ok` and `time`. Lines of JSON behind a topic, as `mosquitto_sub -v` writes them, have the column `topic`.
 
-use crate::error::{Error, Place};
+use crate::error::Error;
 use crate::head::Head;
 use crate::json;
 
@@ -10,10 +10,12 @@ pub(crate) fn pairs(line: &str, number: u64) -> Result<Vec<(String, String)>, Er
     if line.trim_start().starts_with('#') {
         return Ok(Vec::new());
     }
-    found(line.trim()).ok_or_else(|| Error::Line {
-        place: Place { line: number, row: 0 },
-        problem: "not a line of InfluxDB's protocol, as the first lines are".to_owned(),
-        mend: "mend the line, or leave such lines out with --skip-bad",
+    found(line.trim()).ok_or_else(|| {
+        Error::line(
+            number,
+            "not a line of InfluxDB's protocol, as the first lines are",
+            "mend the line, or leave such lines out with --skip-bad",
+        )
     })
 }
 
@@ -115,10 +117,12 @@ pub(crate) fn has_topics(head: &Head) -> bool {
 
 /// The names and texts of such a line.
 pub(crate) fn topic_pairs(line: &str, number: u64) -> Result<Vec<(String, String)>, Error> {
-    let (topic, object) = behind_topic(line).ok_or_else(|| Error::Line {
-        place: Place { line: number, row: 0 },
-        problem: "not a topic and an object of JSON, as the first lines are".to_owned(),
-        mend: "mend the line, or leave such lines out with --skip-bad",
+    let (topic, object) = behind_topic(line).ok_or_else(|| {
+        Error::line(
+            number,
+            "not a topic and an object of JSON, as the first lines are",
+            "mend the line, or leave such lines out with --skip-bad",
+        )
     })?;
     let mut pairs = vec![("topic".to_owned(), topic.to_owned())];
     pairs.extend(json::flattened(object, number)?);

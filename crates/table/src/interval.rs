@@ -1,29 +1,18 @@
 //! Units of times in names of columns, as of `time_ms`, `Time [us]`, `elapsedMs` and `t/h`.
 
 use crate::hint::without_unit;
+use crate::names::is_one_of;
 use crate::time::{Time, Unit};
 
 /// Unit of times that are numbers, as `--time-format` says it.
-const WORDS: [(&str, &[&str]); 7] = [
-    ("s", &["s", "sec", "secs", "second", "seconds"]),
-    ("ms", &["ms", "msec", "msecs", "millis", "millisecond", "milliseconds"]),
-    (
-        "us",
-        &[
-            "us",
-            "µs",
-            "μs",
-            "usec",
-            "usecs",
-            "micros",
-            "microsecond",
-            "microseconds",
-        ],
-    ),
-    ("ns", &["ns", "nsec", "nsecs", "nanos", "nanosecond", "nanoseconds"]),
-    ("min", &["min", "mins", "minute", "minutes"]),
-    ("h", &["h", "hr", "hrs", "hour", "hours"]),
-    ("d", &["days"]),
+const WORDS: [(&str, &str); 7] = [
+    ("s", "s|sec|secs|second|seconds|sekunden|secondes|segundos"),
+    ("ms", "ms|msec|msecs|millis|millisecond|milliseconds"),
+    ("us", "us|µs|μs|usec|usecs|micros|microsecond|microseconds|microsec"),
+    ("ns", "ns|nsec|nsecs|nanos|nanosecond|nanoseconds|nanosec|nanosecs"),
+    ("min", "min|mins|minute|minutes|minuten|minutos"),
+    ("h", "h|hr|hrs|hour|hours|stunden|heures|horas"),
+    ("d", "days|tage|jours"),
 ];
 
 /// Where the last word of a name begins, and where it ends.
@@ -43,18 +32,32 @@ fn last_word(name: &str) -> (usize, usize) {
     (capital.unwrap_or(begin), end)
 }
 
-/// The unit that the last word of a name states, as `--time-format` says it, and the name without it.
+/// The unit of a word, as `--time-format` says it.
+pub(crate) fn unit(word: &str) -> Option<&'static str> {
+    let found = WORDS.iter().find(|(_, words)| is_one_of(words, word));
+    found.map(|(unit, _)| *unit)
+}
+
+/// The unit that the last word of a name states, as `--time-format` says it, and the name without it; also before the event that times count
+/// from, as of `hours since start`.
 pub(crate) fn of_name(name: &str) -> Option<(&'static str, &str)> {
+    let before = || {
+        let (unit, event) = name.split_once(" since ")?;
+        event.starts_with(char::is_alphabetic).then(|| of_last_word(unit))?
+    };
+    of_last_word(name).or_else(before)
+}
+
+fn of_last_word(name: &str) -> Option<(&'static str, &str)> {
     let (begin, end) = last_word(name);
     let word = name[begin..end].to_lowercase();
     let in_brackets = name[..begin].ends_with(['(', '[']);
-    let (unit, _) = WORDS
-        .iter()
-        .find(|(unit, words)| words.contains(&word.as_str()) || (in_brackets && (*unit == word || word == "day")))?;
+    let in_days = || (in_brackets && matches!(word.as_str(), "d" | "day")).then_some("d");
+    let unit = unit(&word).or_else(in_days)?;
     let rest = name[..begin].trim_end_matches([' ', '_', '-', '.', ',', '(', '[', '/', ':']);
     // `in` of `time in ms` belongs to the unit.
     let rest = rest.strip_suffix(" in").or(rest.strip_suffix("_in")).unwrap_or(rest);
-    Some((*unit, rest))
+    Some((unit, rest))
 }
 
 /// The number and the unit of a time that is spelled with one, as `1.5 sec` and `3 min`.
@@ -121,9 +124,13 @@ mod tests {
             ("t/ns", "ns", "t"),
             ("time in h", "h", "time"),
             ("Time [d]", "d", "Time"),
+            ("Time (day)", "d", "Time"),
             ("millis", "ms", ""),
             ("time_min", "min", "time"),
             ("t(s)", "s", "t"),
+            ("hours since start", "h", ""),
+            ("run minutes since last event", "min", "run"),
+            ("Zeit in Stunden", "h", "Zeit"),
         ] {
             assert_eq!(of_name(name), Some((unit, rest)), "{name}");
         }
@@ -138,6 +145,7 @@ mod tests {
             "()",
             "day",
             "ts",
+            "hours since 1970-01-01",
         ] {
             assert_eq!(of_name(name), None, "{name}");
         }

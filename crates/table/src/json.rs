@@ -1,7 +1,7 @@
 //! Lines of JSON objects as rows: `{"Time": "...", "SI7021": {"Temperature": 20.0}}` has the columns `Time` and `SI7021.Temperature`.
 //! Numbers keep their digits: they are read as text, as those of other tables.
 
-use crate::error::{Error, Place, printable};
+use crate::error::{Error, printable};
 use crate::lines::{Line, Row};
 use crate::named::is_time_name;
 
@@ -20,10 +20,12 @@ pub(crate) fn flattened(line: &str, number: u64) -> Result<Vec<(String, String)>
         at: 0,
     };
     let mut pairs = Vec::new();
-    let refused = |at: usize| Error::Line {
-        place: Place { line: number, row: 0 },
-        problem: format!("byte {} is not as in a line of JSON", at + 1),
-        mend: "one object stands on each line (jq -c '.[]' makes lines of a list); leave the line out with --skip-bad",
+    let refused = |at: usize| {
+        Error::line(
+            number,
+            format!("byte {} is not as in a line of JSON", at + 1),
+            "one object stands on each line (jq -c '.[]' makes lines of a list); leave the line out with --skip-bad",
+        )
     };
     let done = reader.value("", 0, &mut pairs).is_some() && reader.peek().is_none();
     if done { Ok(pairs) } else { Err(refused(reader.at)) }
@@ -82,11 +84,7 @@ pub(crate) struct Keys {
 pub(crate) fn row(Keys { keys, pairs }: &Keys, row: &mut Row, found: &Line) -> Result<Option<()>, Error> {
     let Line::Text(line) = *found else {
         let (Line::Text(line) | Line::TooLong(line)) = *found;
-        return Err(Error::Line {
-            place: Place { line, row: 0 },
-            problem: "too long".to_owned(),
-            mend: "leave such lines out with --skip-bad",
-        });
+        return Err(Error::line(line, "too long", "leave such lines out with --skip-bad"));
     };
     row.line = line;
     let text = String::from_utf8_lossy(&row.text).into_owned();
@@ -102,18 +100,18 @@ pub(crate) fn row(Keys { keys, pairs }: &Keys, row: &mut Row, found: &Line) -> R
             if value.is_empty() {
                 continue;
             }
-            return Err(Error::Line {
-                place: Place { line, row: 0 },
-                problem: format!("the key `{}` is in none of the first lines", printable(&key)),
-                mend: "put a line with all keys first, or leave such lines out with --skip-bad",
-            });
+            return Err(Error::line(
+                line,
+                format!("the key `{}` is in none of the first lines", printable(&key)),
+                "put a line with all keys first, or leave such lines out with --skip-bad",
+            ));
         };
         if row.cells[column].1 > 0 {
-            return Err(Error::Line {
-                place: Place { line, row: 0 },
-                problem: format!("the key `{}` stands twice", printable(&key)),
-                mend: "mend the line, or leave such lines out with --skip-bad",
-            });
+            return Err(Error::line(
+                line,
+                format!("the key `{}` stands twice", printable(&key)),
+                "mend the line, or leave such lines out with --skip-bad",
+            ));
         }
         let from = row.text.len();
         row.text.extend_from_slice(value.trim().as_bytes());

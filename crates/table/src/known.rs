@@ -152,7 +152,7 @@ pub(crate) fn names(format: &str, lines: &[(u64, String)], count: usize) -> Vec<
             .to_owned()
     };
     let name = |i: usize| match (format, i) {
-        ("EPW", i) => EPW.get(i).copied().unwrap_or("").to_owned(),
+        ("EPW", i) => EPW.split('|').nth(i).unwrap_or("").to_owned(),
         (TEKTRONIX, i) => match i {
             0..SETTINGS => ["setting", "setting_value", "setting_unit"][i].to_owned(),
             3 => "time".to_owned(),
@@ -165,43 +165,11 @@ pub(crate) fn names(format: &str, lines: &[(u64, String)], count: usize) -> Vec<
 }
 
 /// Names of the columns of an EPW file, as far as they are usual.
-const EPW: [&str; 35] = [
-    "year",
-    "month",
-    "day",
-    "hour",
-    "minute",
-    "uncertainty",
-    "dry_bulb",
-    "dew_point",
-    "humidity",
-    "pressure",
-    "extraterrestrial_horizontal",
-    "extraterrestrial_normal",
-    "infrared",
-    "global_horizontal",
-    "direct_normal",
-    "diffuse_horizontal",
-    "global_illuminance",
-    "direct_illuminance",
-    "diffuse_illuminance",
-    "zenith_luminance",
-    "wind_direction",
-    "wind_speed",
-    "total_sky_cover",
-    "opaque_sky_cover",
-    "visibility",
-    "ceiling",
-    "weather_observed",
-    "weather_codes",
-    "precipitable_water",
-    "aerosol_depth",
-    "snow_depth",
-    "days_since_snow",
-    "albedo",
-    "rain_depth",
-    "rain_quantity",
-];
+const EPW: &str = "year|month|day|hour|minute|uncertainty|dry_bulb|dew_point|humidity|pressure|extraterrestrial_horizontal|\
+    extraterrestrial_normal|infrared|global_horizontal|direct_normal|diffuse_horizontal|global_illuminance|\
+    direct_illuminance|diffuse_illuminance|zenith_luminance|wind_direction|wind_speed|total_sky_cover|\
+    opaque_sky_cover|visibility|ceiling|weather_observed|weather_codes|precipitable_water|aerosol_depth|\
+    snow_depth|days_since_snow|albedo|rain_depth|rain_quantity";
 
 /// Words that stand for units in a row of their own.
 const UNITS: &str = "ts rn smp volt volts v vdc vac mv uv kv amp amps a ma ua w mw kw wh kwh mwh hz khz mhz s sec secs second seconds ms us ns msecs usecs nsecs \

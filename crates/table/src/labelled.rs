@@ -1,7 +1,7 @@
 //! Lines whose cells have their names in front, as `Temp:20.1,Hum:50` or `time=12:00:01 temp=20.1`: programs that show what a serial port
 //! says expect them, and loggers write them. A time may stand in front of the first name: `12:00:01.123 -> Temp:20.1`.
 
-use crate::error::{Error, Place};
+use crate::error::Error;
 use crate::guess::looks_like_time;
 use crate::head::Head;
 
@@ -26,10 +26,12 @@ pub(crate) fn is_labelled(head: &Head) -> bool {
 
 /// The names and the texts of a line.
 pub(crate) fn pairs(line: &str, number: u64) -> Result<Vec<(String, String)>, Error> {
-    found(line).ok_or_else(|| Error::Line {
-        place: Place { line: number, row: 0 },
-        problem: "not every cell has its name in front, as in the first lines".to_owned(),
-        mend: "mend the line, or leave such lines out with --skip-bad",
+    found(line).ok_or_else(|| {
+        Error::line(
+            number,
+            "not every cell has its name in front, as in the first lines",
+            "mend the line, or leave such lines out with --skip-bad",
+        )
     })
 }
 

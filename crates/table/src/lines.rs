@@ -4,7 +4,7 @@
 //! several characters and no runs of spaces. A test compares this file with it on random tables.
 
 use crate::dialect::Delimiter;
-use crate::error::{Error, Place};
+use crate::error::Error;
 use std::collections::VecDeque;
 use std::io::{BufRead, Read};
 
@@ -306,20 +306,20 @@ impl Split {
         lines.put_back(taken);
         row.text.clear();
         row.cells.clear();
-        Err(Error::Line {
-            place: Place { line: row.line, row: 0 },
-            problem: "a quote does not close".to_owned(),
-            mend: "close it, leave the line out with --skip-bad, or say the mark with --quote",
-        })
+        Err(Error::line(
+            row.line,
+            "a quote does not close",
+            "close it, leave the line out with --skip-bad, or say the mark with --quote",
+        ))
     }
 }
 
 fn too_long(line: u64) -> Error {
-    Error::Line {
-        place: Place { line, row: 0 },
-        problem: format!("longer than {MAX_LINE} bytes"),
-        mend: "this is no table of text, or its lines do not end; leave the line out with --skip-bad",
-    }
+    Error::line(
+        line,
+        format!("longer than {MAX_LINE} bytes"),
+        "this is no table of text, or its lines do not end; leave the line out with --skip-bad",
+    )
 }
 
 fn check_text(row: &Row) -> Result<(), Error> {
@@ -328,10 +328,10 @@ fn check_text(row: &Row) -> Result<(), Error> {
     }
     match std::str::from_utf8(&row.text) {
         Ok(_) => Ok(()),
-        Err(error) => Err(Error::Line {
-            place: Place { line: row.line, row: 0 },
-            problem: format!("byte {} is not text in UTF-8", error.valid_up_to() + 1),
-            mend: "say how it is written, as --encoding latin1, windows-1251, shift_jis or gbk",
-        }),
+        Err(error) => Err(Error::line(
+            row.line,
+            format!("byte {} is not text in UTF-8", error.valid_up_to() + 1),
+            "say how it is written, as --encoding latin1, windows-1251, shift_jis or gbk",
+        )),
     }
 }

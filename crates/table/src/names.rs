@@ -9,6 +9,11 @@ pub fn split(text: &str) -> Vec<String> {
         .collect()
 }
 
+/// Whether a word is one of a list, which has bars between its words.
+pub(crate) fn is_one_of(words: &str, word: &str) -> bool {
+    words.split('|').any(|known| known == word)
+}
+
 /// The pieces of a text between the marks that stand outside of quotes, with their quotes.
 pub fn pieces(text: &str, mark: char) -> Vec<String> {
     let (mut pieces, mut is_quoted) = (vec![String::new()], false);

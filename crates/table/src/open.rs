@@ -37,11 +37,11 @@ impl Table {
             head = Head::read(&mut *reader)?;
         }
         if head.lines.is_empty() && head.bytes.len() >= head::MAX_BYTES {
-            return Err(Error::Line {
-                place: Place { line: 1, row: 0 },
-                problem: format!("the first {} bytes have no end of a line", head.bytes.len()),
-                mend: "take some of the columns, as: cut -d, -f1-1000 FILE | fewbits ... -",
-            });
+            return Err(Error::line(
+                1,
+                format!("the first {} bytes have no end of a line", head.bytes.len()),
+                "take some of the columns, as: cut -d, -f1-1000 FILE | fewbits ... -",
+            ));
         }
         let first = head.bytes.iter().copied().find(|c| !c.is_ascii_whitespace());
         let is_object = first == Some(b'{') && said.delimiter.is_none();
@@ -249,14 +249,8 @@ fn of_text(
     if own_names.is_empty() {
         return Err(Error::Empty);
     }
-    let refused = |problem: &str, mend: &'static str| {
-        let place = Place {
-            line: first_line.saturating_sub(1).max(1),
-            row: 0,
-        };
-        let problem = problem.to_owned();
-        Err(Error::Line { place, problem, mend })
-    };
+    let names_line = first_line.saturating_sub(1).max(1);
+    let refused = |problem: &str, mend: &'static str| Err(Error::line(names_line, problem, mend));
     let has = |marks: &[char]| own_names.iter().any(|name| name.contains(marks));
     if dialect.encoding.is_none() && has(&['\u{fffd}']) {
         return refused(
@@ -275,14 +269,11 @@ fn of_text(
         && said.delimiter.is_none()
         && let Some(mark) = other_mark(&lines)
     {
-        return Err(Error::Line {
-            place: Place {
-                line: first_line.saturating_sub(1).max(1),
-                row: 0,
-            },
-            problem: format!("one column, and `{mark}` stands as often in each line as in that of the names"),
-            mend: "name what separates cells with --delimiter; or say --delimiter , if this is one column",
-        });
+        return Err(Error::line(
+            names_line,
+            format!("one column, and `{mark}` stands as often in each line as in that of the names"),
+            "name what separates cells with --delimiter; or say --delimiter , if this is one column",
+        ));
     }
     rows.header.clone_from(&own_names);
     let columns = named(&own_names, &units);

@@ -1,7 +1,9 @@
 //! Dates in several columns: which columns give one, and what each of them means.
 
 use crate::column::Column;
-use crate::time::SECOND;
+use crate::interval;
+use crate::names::is_one_of;
+use crate::time::{SECOND, Unit};
 
 /// Meaning of a column of a part of a date.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,23 +48,10 @@ fn letters(name: &str) -> String {
 /// Whether two names are those of the week of GPS and of the seconds, or thousandths, of the week.
 fn week_parts(week: &str, of_week: &str) -> Option<Vec<Part>> {
     const WEEKS: [&str; 6] = ["week", "gpsweek", "gpswk", "wn", "gpswn", "gpsweeknumber"];
-    const SECONDS: [&str; 13] = [
-        "tow",
-        "gpstow",
-        "sow",
-        "gpssow",
-        "gpsseconds",
-        "gpssecond",
-        "gpssec",
-        "gpssecs",
-        "secondsofweek",
-        "gpssecondsofweek",
-        "timeofweek",
-        "gpstimeofweek",
-        "weekseconds",
-    ];
+    const SECONDS: &str = "tow|gpstow|sow|gpssow|gpsseconds|gpssecond|gpssec|gpssecs|secondsofweek|gpssecondsofweek|timeofweek|\
+        gpstimeofweek|weekseconds";
     let name = letters(of_week);
-    let is_named = |name: &str| SECONDS.contains(&name);
+    let is_named = |name: &str| is_one_of(SECONDS, name);
     let is_thousandths = of_week.to_lowercase().contains("[ms]") || of_week.to_lowercase().contains("(ms)");
     let decimals = match name.as_str() {
         "itow" | "gpsms" | "weekms" | "gpsmilliseconds" => 3,
@@ -90,32 +79,22 @@ pub(crate) fn weeks(columns: &[Column]) -> Option<Vec<usize>> {
 
 /// The part of a date that a name means, behind the parts of other columns.
 fn part(name: &str, before: &[Part]) -> Option<Part> {
-    const MEANINGS: [(Part, &[&str]); 8] = [
-        (
-            Part::Year,
-            &[
-                "year", "yyyy", "yr", "yy", "#yy", "jahr", "année", "annee", "année", "año", "anno", "jaar", "ano",
-            ],
-        ),
-        (
-            Part::Month,
-            &[
-                "month", "mm", "mo", "mon", "monat", "mois", "mes", "mese", "maand", "mês",
-            ],
-        ),
-        (Part::Day, &["day", "dd", "dy", "tag", "jour", "día", "dia", "giorno", "dag"]),
-        (Part::Hour, &["hour", "hh", "hr", "stunde", "heure", "hora"]),
-        (Part::Minute, &["minute", "min", "mi", "mn"]),
-        (Part::Second, &["second", "sec", "ss", "seconds"]),
-        (Part::DayOfYear, &["doy", "jday", "julian", "julian_day", "day_of_year", "yday", "ddd"]),
-        (Part::OfDay, &["time", "hhmm", "hrmn", "hrmin", "hour_minute", "uhrzeit"]),
+    const MEANINGS: [(Part, &str); 8] = [
+        (Part::Year, "year|yyyy|yr|yy|#yy|jahr|année|annee|année|año|anno|jaar|ano"),
+        (Part::Month, "month|mm|mo|mon|monat|mois|mes|mese|maand|mês"),
+        (Part::Day, "day|dd|dy|tag|jour|día|dia|giorno|dag"),
+        (Part::Hour, "hour|hh|hr|stunde|heure|hora"),
+        (Part::Minute, "minute|min|mi|mn"),
+        (Part::Second, "second|sec|ss|seconds"),
+        (Part::DayOfYear, "doy|jday|julian|julian_day|day_of_year|yday|ddd"),
+        (Part::OfDay, "time|hhmm|hrmn|hrmin|hour_minute|uhrzeit"),
     ];
     let lower = name.to_lowercase();
     // `MM` and `mm` stand for months and minutes.
     if lower == "mm" && before.contains(&Part::Hour) {
         return Some(Part::Minute);
     }
-    let found = MEANINGS.iter().find(|(_, words)| words.contains(&lower.as_str()))?.0;
+    let found = MEANINGS.iter().find(|(_, words)| is_one_of(words, &lower))?.0;
     (!before.contains(&found)).then_some(found)
 }
 
@@ -266,39 +245,10 @@ pub(crate) fn padded(cell: &str) -> std::borrow::Cow<'_, str> {
 
 /// Decimals of a second that the last word of a name counts, and what stands before it: 9 and `stamp` of `stamp.nsecs`.
 fn counted(name: &str) -> (Option<u8>, String) {
-    const WORDS: [(u8, &[&str]); 4] = [
-        (0, &["s", "sec", "secs", "second", "seconds"]),
-        (3, &["ms", "msec", "msecs", "millis", "millisecond", "milliseconds"]),
-        (
-            6,
-            &[
-                "us",
-                "usec",
-                "usecs",
-                "micros",
-                "microsec",
-                "microsecond",
-                "microseconds",
-            ],
-        ),
-        (
-            9,
-            &[
-                "ns",
-                "nsec",
-                "nsecs",
-                "nanos",
-                "nanosec",
-                "nanosecs",
-                "nanosecond",
-                "nanoseconds",
-            ],
-        ),
-    ];
     let lower = name.to_lowercase();
     let (before, word) = lower.rsplit_once(['.', '_', '/', ' ']).unwrap_or(("", &lower));
-    let found = WORDS.iter().find(|(_, words)| words.contains(&word));
-    (found.map(|(decimals, _)| *decimals), before.to_owned())
+    let unit = interval::unit(word).and_then(interval::part);
+    (unit.map(Unit::decimals), before.to_owned())
 }
 
 /// Decimals of parts of a second, by the name of their column.

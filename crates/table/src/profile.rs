@@ -85,8 +85,8 @@ pub(crate) fn boolean(cell: &str) -> Option<bool> {
         return None;
     }
     match cell.to_ascii_lowercase().as_str() {
-        "true" | "on" | "yes" => Some(true),
-        "false" | "off" | "no" => Some(false),
+        "true" | "on" | "yes" | "1" => Some(true),
+        "false" | "off" | "no" | "0" => Some(false),
         _ => None,
     }
 }

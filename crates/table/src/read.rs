@@ -243,14 +243,11 @@ impl Table {
                 if blanks < 2 || !goes_back {
                     return Ok(true);
                 }
-                return Err(Error::Line {
-                    place: Place {
-                        line: self.row.line,
-                        row: 0,
-                    },
-                    problem: BLOCK.to_owned(),
-                    mend: "make a file of each block, as: awk 'BEGIN {RS = \"\\n\\n\\n+\"} NR == 1' FILE | fewbits ... -",
-                });
+                return Err(Error::line(
+                    self.row.line,
+                    BLOCK,
+                    "make a file of each block, as: awk 'BEGIN {RS = \"\\n\\n\\n+\"} NR == 1' FILE | fewbits ... -",
+                ));
             }
             return Ok(true);
         }

@@ -5,45 +5,11 @@ use crate::names;
 use crate::table::Table;
 
 /// Words in names of columns that hold names of sensors, the likeliest first.
-const SENSORS: [&str; 20] = [
-    "entity_id",
-    "_field",
-    "sensor",
-    "parameter",
-    "variable",
-    "metric",
-    "signal",
-    "channel",
-    "quantity",
-    "measurand",
-    "tag",
-    "field",
-    "series",
-    "device",
-    "point",
-    "station",
-    "source",
-    "probe",
-    "name",
-    "id",
-];
+const SENSORS: &str = "entity_id|_field|sensor|parameter|variable|metric|signal|channel|quantity|measurand|tag|field|series|device|\
+    point|station|source|probe|name|id";
 /// Names of columns of readings.
-const VALUES: [&str; 14] = [
-    "value",
-    "_value",
-    "state",
-    "reading",
-    "val",
-    "values",
-    "result",
-    "wert",
-    "measurement",
-    "valor",
-    "valeur",
-    "raw_value",
-    "sensor_value",
-    "data",
-];
+const VALUES: &str =
+    "value|_value|state|reading|val|values|result|wert|measurement|valor|valeur|raw_value|sensor_value|data";
 
 /// The columns of a table whose rows look like single readings.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -65,8 +31,8 @@ impl Readings {
 impl Table {
     /// The columns of names and readings if the first rows look like single readings of several sensors.
     pub fn readings(&self) -> Option<Readings> {
-        let value = VALUES.iter().find_map(|name| {
-            let is_it = |i: &usize| self.columns[*i].own_name.to_lowercase() == *name;
+        let value = VALUES.split('|').find_map(|name| {
+            let is_it = |i: &usize| self.columns[*i].own_name.to_lowercase() == name;
             (0..self.columns.len()).find(is_it)
         })?;
         let is_sensor = |i: &usize| {
@@ -77,10 +43,10 @@ impl Table {
                 && words >= 2
                 && 2 * words <= profile.values()
         };
-        let by = SENSORS.iter().find_map(|name| {
+        let by = SENSORS.split('|').find_map(|name| {
             let is_named = |i: &usize| {
                 let own = self.columns[*i].own_name.to_lowercase();
-                own == *name || (name.len() > 3 && own.contains(name))
+                own == name || (name.len() > 3 && own.contains(name))
             };
             (0..self.columns.len()).find(|i| is_named(i) && is_sensor(i))
         })?;

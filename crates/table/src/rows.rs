@@ -1,7 +1,7 @@
 //! Rows of a text with a known dialect.
 
 use crate::dialect::{Delimiter, Dialect};
-use crate::error::{Error, Place};
+use crate::error::Error;
 use crate::json::{self, Keys};
 use crate::lines::{Line, Lines, Row, Split};
 use crate::missing;
@@ -101,11 +101,11 @@ impl Rows {
             && row.cells.len() == self.header.len()
         {
             let (Line::Text(line) | Line::TooLong(line)) = *found;
-            return Err(Error::Line {
-                place: Place { line, row: 0 },
-                problem: "a comment with as many cells as a row".to_owned(),
-                mend: "say --comment '#' if it is one, or --comment '' if it is a row",
-            });
+            return Err(Error::line(
+                line,
+                "a comment with as many cells as a row",
+                "say --comment '#' if it is one, or --comment '' if it is a row",
+            ));
         }
         Ok(())
     }
@@ -185,22 +185,22 @@ impl Rows {
                 && is_digits(behind)
         };
         if count == columns + 1 && (0..columns).any(|i| is_time(&i)) {
-            return Err(Error::Line {
-                place: Place { line: row.line, row: 0 },
-                problem: format!("{count} cells instead of {columns}, and a comma behind seconds"),
-                mend: "write a point before their decimals: sed -E 's/(:[0-9]{2}),([0-9]{3})/\\1.\\2/' FILE | fewbits ... -",
-            });
+            return Err(Error::line(
+                row.line,
+                format!("{count} cells instead of {columns}, and a comma behind seconds"),
+                "write a point before their decimals: sed -E 's/(:[0-9]{2}),([0-9]{3})/\\1.\\2/' FILE | fewbits ... -",
+            ));
         }
         let s = if count == 1 { "" } else { "s" };
-        Err(Error::Line {
-            place: Place { line: row.line, row: 0 },
-            problem: format!("{count} cell{s} instead of {columns}"),
-            mend: if count < columns {
+        Err(Error::line(
+            row.line,
+            format!("{count} cell{s} instead of {columns}"),
+            if count < columns {
                 "mend the row, leave such rows out with --skip-bad, take what they lack as gaps with --short-rows, or say what separates \
                  cells with --delimiter"
             } else {
                 "mend the row, leave such rows out with --skip-bad, or say what separates cells with --delimiter"
             },
-        })
+        ))
     }
 }

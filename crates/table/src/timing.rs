@@ -11,6 +11,8 @@ use crate::sample::Refused;
 use crate::table::Table;
 use crate::time::Scale;
 #[cfg(feature = "parquet")]
+use crate::time::Unit;
+#[cfg(feature = "parquet")]
 use crate::written::Clock;
 use crate::written::Syntax;
 
@@ -140,7 +142,8 @@ impl Table {
             let scale = if zone.is_some() { Scale::Utc } else { scale };
             self.dialect.time_column = vec![self.columns[*column].name.clone()];
             self.selected.retain(|other| other != column);
-            self.time = Some((columns, Clock::typed(scale, zone)));
+            let clock = Clock::new(Syntax::Number(Unit::Seconds), scale);
+            self.time = Some((columns, Clock { zone, ..clock }));
             return Ok(());
         }
         let own = |i: &usize| {

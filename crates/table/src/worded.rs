@@ -99,6 +99,22 @@ pub(crate) fn arranged(text: &str) -> Option<String> {
     Some(format!("{year}-{month:02}-{day:0>2} {}", words.join(" ")))
 }
 
+/// The first day of a quarter, or of a month before its year: `2026 Q1`, `2026Q1`, `Q1/2026`, `03/2026`.
+pub(crate) fn of_period(text: &str) -> Option<String> {
+    const MARKS: [char; 3] = [' ', '-', '/'];
+    let at = text.find(MARKS).or(text.find(['Q', 'q']))?;
+    let (first, last) = (&text[..at], text[at..].trim_start_matches(MARKS));
+    let (year, part) = if first.len() == 4 { (first, last) } else { (last, first) };
+    let (value, count, rest) = digits(part.trim_start_matches(['Q', 'q']), 3)?;
+    let month = match part.starts_with(['Q', 'q']) {
+        true => 3 * value - 2,
+        false if first.len() <= 2 && count <= 2 => value,
+        false => return None,
+    };
+    let is_year = year.len() == 4 && year.bytes().all(|c| c.is_ascii_digit());
+    (is_year && rest.is_empty() && (1..=12).contains(&month)).then(|| format!("{year}-{month:02}-01"))
+}
+
 /// The three numbers at the beginning of a date with marks between them, and whether each has two digits at most.
 pub(crate) fn three(cell: &str) -> Option<([i64; 3], bool)> {
     let (first, first_count, rest) = digits(undressed(cell), 4)?;

@@ -131,12 +131,11 @@ pub(crate) fn zone(text: &str) -> Option<TimeZone> {
 }
 
 impl Clock {
-    /// The clock of times that are typed as such.
-    #[cfg(feature = "parquet")]
-    pub(crate) fn typed(scale: Scale, zone: Option<TimeZone>) -> Self {
+    /// A clock that is as exact as its cells, of any size and with any marks.
+    pub(crate) fn new(syntax: Syntax, scale: Scale) -> Self {
         Self {
-            syntax: Syntax::Number(Unit::Seconds),
-            zone,
+            syntax,
+            zone: None,
             scale,
             takes_leap_seconds: false,
             cuts: false,

@@ -76,7 +76,7 @@ pub(super) fn read_anchors(file: &str) -> Result<Vec<Anchor>, Error> {
     let (label, axes) = columns(file, &names)?;
     let places: Vec<String> = axes.iter().map(|i| names[*i].clone()).collect();
     let mut table = Table::open(&options(places.clone(), has_none))?.with_labels(&names[label])?;
-    table.require_numbers()?;
+    table.require_numbers(|_| true)?;
     // Columns come in the order of the table.
     let order: Vec<usize> = places
         .iter()

@@ -109,7 +109,7 @@ impl TableRows {
         if let Some(hint) = roles.hint(&table).or_else(|| roles.mixed(&table).filter(|_| is_levels)) {
             return Err(Error::content(table.file(), hint));
         }
-        table.require_numbers()?;
+        table.require_numbers(|_| true)?;
         let base = table.time_base(&table_options, None)?;
         if table.is_at_end()? {
             return Err(Error::empty(table.file(), "rows"));

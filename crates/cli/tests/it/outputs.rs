@@ -254,6 +254,41 @@ fn refused_append_leaves_the_recording() {
     assert_eq!(rows.lines().count(), 2001);
 }
 
+/// Defect: the places of words in their list were appended to numbers, and verified as such.
+#[test]
+fn words_are_no_numbers_of_a_recording() {
+    let (_kept, folder) = folder();
+    std::fs::write(folder.join("n.csv"), "time,s\n0,0\n1,1\n2,0\n").unwrap();
+    std::fs::write(folder.join("w.csv"), "time,s\n0,a\n1,b\n2,a\n").unwrap();
+    good(&folder, &["pack", "n.csv", "--time", "exact", "-o", "n.fewb"], b"");
+    let before = std::fs::read(folder.join("n.fewb")).unwrap();
+    for words in [
+        &["pack", "w.csv", "--append", "-o", "n.fewb"][..],
+        &["verify", "w.csv", "n.fewb"],
+    ] {
+        let message = refused(&folder, words, b"");
+        assert!(message.contains("column `s` holds words, and numbers are expected"), "{message}");
+    }
+    refused(&folder, &["pack", "-", "--append", "-o", "n.fewb"], b"time,s\n3,a\n4,b\n");
+    assert_eq!(std::fs::read(folder.join("n.fewb")).unwrap(), before);
+}
+
+#[test]
+fn append_of_earlier_times_is_told() {
+    let (_kept, folder) = folder();
+    std::fs::write(folder.join("n.csv"), "time,s\n10,0\n11,1\n").unwrap();
+    std::fs::write(folder.join("later.csv"), "time,s\n11,0\n12,1\n").unwrap();
+    good(&folder, &["pack", "n.csv", "--time", "exact", "-o", "n.fewb"], b"");
+    let told = |file: &str| {
+        let output = fewbits(&folder, &["pack", file, "--append", "-o", "n.fewb"], b"");
+        String::from_utf8(output.stderr)
+            .unwrap()
+            .contains("is before the last of n.fewb, 1")
+    };
+    assert!(!told("later.csv"));
+    assert!(told("n.csv"));
+}
+
 #[test]
 fn append_without_time_takes_the_times_of_the_table() {
     let (_kept, folder) = folder();

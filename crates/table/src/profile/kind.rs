@@ -25,6 +25,9 @@ impl Profile {
             // Numbers with a unit behind each, which has to be cut off.
             return Kind::Number;
         }
+        if self.are_bits() {
+            return Kind::Boolean;
+        }
         if numbers >= words.max(self.times).max(1) {
             // Few words among numbers are faults, not words of an enumeration.
             return if self.integers > 0 && self.fractions == 0 {
@@ -66,7 +69,13 @@ impl Profile {
         }
     }
 
-    /// A cell whose digits have zeros in front, if these are lost since the column is one of numbers.
+    /// Whether cells are booleans, also by the numbers 0 and 1.
+    fn are_bits(&self) -> bool {
+        let others = self.texts + self.faults + self.times + self.integers + self.fractions;
+        self.booleans > 0 && others == 0 && self.range.is_none_or(|(low, high)| low >= 0.0 && high <= 1.0)
+    }
+
+    /// A cell whose digits have zeros in front, or the plus of a long number, if these are lost since the column is one of numbers.
     pub fn lost_zeros(&self) -> Option<&str> {
         let is_number = matches!(self.kind(), Kind::Number | Kind::Integer);
         self.padded.as_deref().filter(|_| is_number)
@@ -94,6 +103,7 @@ impl Profile {
     pub fn suspicious(&self) -> u64 {
         match self.kind() {
             Kind::Number | Kind::Integer => self.faults + self.texts + self.booleans + self.times,
+            Kind::Boolean if self.are_bits() => 0,
             Kind::Boolean => self.faults + self.numbers + self.integers + self.times,
             Kind::Time => self.faults + self.texts + self.booleans + self.numbers + self.integers,
             _ => 0,

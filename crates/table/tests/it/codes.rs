@@ -54,6 +54,9 @@ fn zeros_of_identifiers_are_kept() {
             .collect::<Vec<_>>(),
         [("x", "0007")]
     );
+    let table = column("caller", &["+491715550000", "+491715550001"]);
+    assert_eq!(table.lost_zeros()[0].1, "+491715550000");
+    are_words("phone", &["+491715550000", "+491715550001"]);
     for (name, cells) in [("x", ["0.5", "00.5", "0"]), ("id", ["7", "42", "100"])] {
         assert!(column(name, &cells).lost_zeros().is_empty());
         assert_eq!(column(name, &cells).columns()[1].kind, Kind::Number);

@@ -280,3 +280,31 @@ fn names_without_an_end_are_no_empty_file() {
     let message = refused(&(names.join(",") + "\n"));
     assert!(message.contains("no end of a line") && message.contains("cut -d,"), "{message}");
 }
+
+#[test]
+fn names_of_julian_dates_years_and_months_are_asked_for() {
+    let rows = |name: &str, cell: &dyn Fn(u32) -> String| {
+        (0..12).fold(format!("{name},x\n"), |text, i| text + &format!("{},{i}\n", cell(i)))
+    };
+    // Whatever the dates count from.
+    for (name, zero) in [
+        ("TJD", 20_374.5),
+        ("HJD-2450000", 10_374.5),
+        ("jd", 10_374.5),
+        ("Time [BJD - 2454833]", 137.5),
+    ] {
+        mend(&rows(name, &|i| format!("{}", zero + f64::from(i) / 4.0)), "--time-format jd (or mjd), d for days");
+    }
+    mend(&rows("date", &|i| format!("{}", 1950 + i)), "--time-format %Y");
+    // Months of one year are as far apart as numbers.
+    for name in ["month", "Period", "yyyymm"] {
+        mend(&rows(name, &|i| format!("2024{:02}", i + 1)), "--time-format %Y%m");
+    }
+    let seconds_of = |name: &str, from: u32| seconds(&rows_of(name, from));
+    assert_eq!(seconds_of("time", 1950)[..2], [1950.0, 1951.0]);
+    assert_eq!(seconds_of("time", 202_401)[..2], [202_401.0, 202_402.0]);
+}
+
+fn rows_of(name: &str, from: u32) -> fewbits_table::Batch {
+    rows(&mut open(&(0..12).fold(format!("{name},x\n"), |text, i| text + &format!("{},{i}\n", from + i))))
+}

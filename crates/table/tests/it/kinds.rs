@@ -212,3 +212,28 @@ fn every_column_has_a_name_of_its_own() {
         .to_string();
     assert!(message.len() < 300 && message.contains("and 4980 more"), "{message}");
 }
+
+#[test]
+fn zero_and_one_among_booleans_are_booleans() {
+    for cells in [
+        ["true", "0", "1", "false"],
+        ["0", "1", "0", "on"],
+        ["1", "yes", "", "no"],
+    ] {
+        let text = cells
+            .iter()
+            .fold("n,door\n".to_owned(), |text, cell| text + &format!("1,{cell}\n"));
+        let survey = open(&text).survey().unwrap();
+        assert_eq!((survey.columns[1].kind(), survey.columns[1].suspicious()), (Kind::Boolean, 0), "{cells:?}");
+        let mut table = open(&text);
+        table.use_survey(&survey);
+        let expected = cells.map(|cell| match cell {
+            "true" | "1" | "on" | "yes" => Some(1.0),
+            "" => None,
+            _ => Some(0.0),
+        });
+        assert_eq!(numbers(&rows(&mut table).columns[1]), expected, "{cells:?}");
+    }
+    let text = "n,door\n1,true\n1,2\n1,0\n1,1\n";
+    assert_ne!(open(text).survey().unwrap().columns[1].kind(), Kind::Boolean);
+}

@@ -149,3 +149,59 @@ fn parts_of_dates_stand_in_any_order_and_language() {
     assert_eq!(table.dialect().format.as_deref(), Some("Netatmo"));
     assert_eq!(shown(table)[4], "1700000240");
 }
+
+#[test]
+fn a_unit_since_an_event_is_that_of_the_name() {
+    for (name, unit) in [
+        ("hours since start", 3600),
+        ("minutes since midnight", 60),
+        ("time (days since deployment)", 86_400),
+        ("seconds since boot", 1),
+        ("Zeit in Stunden", 3600),
+        ("temps (heures)", 3600),
+    ] {
+        let mut table = open_said(&table(name, &["0", "2", "5"]), &Dialect::default()).unwrap();
+        table.require_time().unwrap();
+        let found: Vec<i64> = rows(&mut table)
+            .times
+            .iter()
+            .map(|time| time.seconds() as i64)
+            .collect();
+        assert_eq!(found, [0, 2 * unit, 5 * unit], "{name}");
+    }
+}
+
+#[test]
+fn quarters_and_months_are_their_first_days() {
+    for cells in [
+        ["2025 Q4", "2026 Q1"],
+        ["2025-Q4", "2026-Q1"],
+        ["2025Q4", "2026Q1"],
+        ["Q4 2025", "Q1 2026"],
+        ["Q4/2025", "Q1/2026"],
+    ] {
+        assert_eq!(taken("period", &cells), ["2025-10-01T00:00:00", "2026-01-01T00:00:00"], "{cells:?}");
+        // Beside a time they are words.
+        let text = format!("time;period\n0;{}\n1;{}\n", cells[0], cells[1]);
+        let mut sorted = cells;
+        sorted.sort_unstable();
+        assert_eq!(open(&text).words(1), sorted, "{cells:?}");
+    }
+    for cells in [["03/2024", "11/2024"], ["03-2024", "11-2024"], ["3/2024", "11/2024"]] {
+        assert_eq!(taken("month", &cells), ["2024-03-01T00:00:00", "2024-11-01T00:00:00"], "{cells:?}");
+    }
+    for cells in [
+        ["2025 Q5", "2026 Q6"],
+        ["2025 Q0", "2026 Q44"],
+        ["13/2024", "14/2024"],
+        ["Q1", "Q2"],
+    ] {
+        assert!(refused("period", &cells).contains("is not a time"), "{cells:?}");
+    }
+}
+
+fn taken(name: &str, cells: &[&str]) -> Vec<String> {
+    let mut table = open_said(&table(name, cells), &Dialect::default()).unwrap();
+    table.require_time().unwrap();
+    shown(table)
+}
