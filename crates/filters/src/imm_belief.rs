@@ -35,6 +35,20 @@ impl<const D: usize> TryFrom<Stored<D>> for ImmBelief<D> {
 }
 
 impl<const D: usize> ImmBelief<D> {
+    /// Buffers for a belief, without a model.
+    pub(crate) fn buffers() -> Self {
+        Self {
+            probabilities: Vec::new(),
+            modes: Vec::new(),
+        }
+    }
+
+    /// Takes all models away.
+    pub(crate) fn clear(&mut self) {
+        self.probabilities.clear();
+        self.modes.clear();
+    }
+
     /// A belief with a probability and a Gaussian for each model.
     ///
     /// # Errors
