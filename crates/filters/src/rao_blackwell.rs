@@ -6,7 +6,7 @@ use crate::{Error, ResamplingRule};
 use fewbits_core::columns::{change_each, count, set_state, state_at};
 use fewbits_core::factor::Scalar;
 use fewbits_core::value_update;
-use fewbits_core::{Cell, FactoredGaussian, Gaussian, GaussianDynamics, Likelihood, LinearScalar};
+use fewbits_core::{Belief, Cell, FactoredGaussian, Gaussian, GaussianDynamics, Likelihood, LinearScalar};
 use fewbits_densities::{GaussianCloud, systematic};
 use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::{LogSum, normal};

@@ -53,7 +53,7 @@ pub fn smooth_step<const D: usize>(
 mod tests {
     use super::smooth_step;
     use crate::kalman;
-    use fewbits_core::{Dynamics, Gaussian, Sensing};
+    use fewbits_core::{Dynamics, Gaussian, LinearDynamics, Sensing};
     use fewbits_models::{LinearSensor, constant_velocity_1d};
     use nalgebra::{DMatrix, DVector, SMatrix, Vector2};
     use rand::SeedableRng;
