@@ -2,6 +2,7 @@
 //! `mpa-ring/...`, `mpa-gibbs/...`.
 
 use crate::references::{agree, numbers};
+use fewbits::core::Belief;
 use fewbits::densities::{Component, Mixture};
 use fewbits::monte_carlo::{Moments, Stream};
 use fewbits_baselines::pf_mpa::{LabelChain, ProductSampler, RingBias, kernel_error, product, ratio_second_moments};

@@ -1,7 +1,9 @@
 //! The five data paths of `docs/architecture.md`, each followed once, and the names in that list.
 
 use fewbits::cfwmd::scheme::CovarianceFeedback;
-use fewbits::core::{BitString, Gaussian, Link, Message, NumberFormat, Observation, SchemeNode, SensorNode, Sign};
+use fewbits::core::{
+    Belief, BitString, Gaussian, Link, Message, NumberFormat, Observation, SchemeNode, SensorNode, Sign,
+};
 use fewbits::densities::Mixture;
 use fewbits::diffusive::{Action, RateModel, RateRange, Search, SearchBox, SearchField, SourceSensor};
 use fewbits::dymbo::{DymboFilter, ScalarFilter, ScalarPlant, SignBit};

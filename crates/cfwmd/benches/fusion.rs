@@ -13,7 +13,7 @@ use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::CensoringRule;
 use fewbits_cfwmd::scheme::Censoring;
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{Factor, Gaussian, Likelihood, Link, Observation};
+use fewbits_core::{Belief, Factor, Gaussian, Likelihood, LinearSensing, Link, Observation};
 use fewbits_densities::Particles;
 use fewbits_filters::centre::{FusionCentre, Slot};
 use fewbits_filters::{BootstrapFilter, MomentFilter, ResamplingRule, StateFilter, assumed_density, kalman};

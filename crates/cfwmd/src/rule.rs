@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::ellipsoid::Ellipsoid;
-use fewbits_core::{Gaussian, GaussianDynamics, Sensing};
+use fewbits_core::{Gaussian, GaussianDynamics, LinearSensing, Sensing};
 use fewbits_filters::{assumed_density, kalman};
 use fewbits_models::LinearSensor;
 use fewbits_numerics::error::positive;

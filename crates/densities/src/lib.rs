@@ -16,6 +16,7 @@
 //! implement [`Density`](fewbits_core::Density).
 //!
 //! ```
+//! use fewbits_core::Belief;
 //! use fewbits_densities::Particles;
 //! let belief = Particles::uniform([vec![1.0, 2.0, 3.0], vec![0.0, 1.0, 2.0]])?;
 //! assert_eq!(belief.mean().as_slice(), &[2.0, 1.0]);
@@ -29,19 +30,6 @@
 //! Not here: dynamics, measurements and resampling (`fewbits-filters`); the reduction of a density to a few Gaussians, divergences
 //! and the code of a mixture in a few bytes (`fewbits-mixture-codec`); products of mixtures (`fewbits-pf-mpa`); adaptive cells and
 //! Hermite series (`fewbits-diffusive`).
-
-/// Implements [`Belief::mean`](fewbits_core::Belief::mean) and `covariance` by the type's own functions of these names.
-macro_rules! own_moments {
-    () => {
-        fn mean(&self) -> SVector<f64, D> {
-            self.mean()
-        }
-
-        fn covariance(&self) -> SMatrix<f64, D, D> {
-            self.covariance()
-        }
-    };
-}
 
 /// Implements [`Density`](fewbits_core::Density) by the type's own `log_pdf` and `log_pdf_columns`.
 macro_rules! own_log_pdf {
@@ -58,7 +46,7 @@ macro_rules! own_log_pdf {
     };
 }
 
-use {own_log_pdf, own_moments};
+use own_log_pdf;
 
 mod grids;
 mod kernel_estimate;

@@ -1,5 +1,5 @@
 //! A centre is stored as bytes in the middle of a run; its copy goes on with the same bits.
-use fewbits_core::{FullValue, Gaussian, Link, SchemeNode, SensorNode};
+use fewbits_core::{Belief, FullValue, Gaussian, Link, SchemeNode, SensorNode};
 use fewbits_filters::centre::{CentreState, FusionCentre, Reporting, Slot};
 use fewbits_filters::{BootstrapFilter, ResamplingRule};
 use fewbits_models::{ContinuousLinear, LinearSensor};

@@ -7,7 +7,7 @@
 
 use divan::{AllocProfiler, Bencher, black_box};
 use fewbits_core::factor::{Levels, Scalar, Value};
-use fewbits_core::{Cell, Dynamics, Gaussian, Likelihood, Link, Observed, Sign};
+use fewbits_core::{Cell, Dynamics, Gaussian, Likelihood, LinearDynamics, Link, Observed, Sign};
 use fewbits_densities::Particles;
 use fewbits_filters::{BootstrapFilter, Resampling, ResamplingRule, Schedule};
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};

@@ -12,13 +12,9 @@ pub(crate) fn predicted<const D: usize>(
     dynamics: &dyn GaussianDynamics<D>,
     belief: &Gaussian<D>,
 ) -> Result<Gaussian<D>, Error> {
-    let found = dynamics.predict(belief, 1.0);
     let what = "the predicted belief (from the process noise)";
-    if found.is_finite() {
-        Ok(found)
-    } else {
-        Err(Error::NotANumber { what })
-    }
+    let found = Some(dynamics.predict(belief, 1.0));
+    found.filter(Gaussian::is_finite).ok_or(Error::NotANumber { what })
 }
 
 /// Results of an update other than the new belief.

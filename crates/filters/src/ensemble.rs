@@ -87,10 +87,7 @@ impl<const D: usize> StateFilter<D> for EnsembleFilter {
         belief: &mut Particles<D>,
         observed: &[&dyn Likelihood<D>],
     ) -> Result<Info, Error> {
-        Ok(Info::new(
-            observed
-                .move_points(belief.columns_mut(), &self.weights)?
-                .log_likelihood,
-        ))
+        let evidence = observed.move_points(belief.columns_mut(), &self.weights)?;
+        Ok(Info::new(evidence.log_likelihood))
     }
 }

@@ -45,14 +45,8 @@ pub struct Imm<const D: usize, F> {
     scales: Vec<f64>,
     /// `T_ij = p(next model j | model i)`, row by row.
     transition: Vec<f64>,
-    workspace: Workspace<D>,
-}
-
-/// Buffers reused from step to step.
-#[derive(Debug, Clone, PartialEq, Default)]
-struct Workspace<const D: usize> {
-    modes: Vec<Gaussian<D>>,
-    probabilities: Vec<f64>,
+    /// Buffers of the next belief.
+    next: ImmBelief<D>,
 }
 
 impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> Imm<D, F> {
@@ -89,7 +83,7 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> Imm<D, F> {
             filters,
             transition,
             scales,
-            workspace: Workspace::default(),
+            next: ImmBelief::buffers(),
         })
     }
 
@@ -131,28 +125,36 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> StateFilter<D> for
         belief: &mut ImmBelief<D>,
     ) -> Result<(), Error> {
         self.check(belief)?;
-        let Self {
-            filters,
-            scales,
-            transition,
-            workspace,
-        } = self;
-        let modes = dynamics.modes();
-        if !(modes.is_empty() || modes.len() == scales.len()) {
-            return refuse(
-                "dynamics",
-                format!("{} modes", modes.len()),
-                format!("{}, one for each scale", scales.len()),
-            );
+        let (models, count) = (dynamics.modes(), self.scales.len());
+        if !(models.is_empty() || models.len() == count) {
+            let expected = format!("{count}, one for each scale");
+            return refuse("dynamics", format!("{} modes", models.len()), expected);
         }
-        mix(belief, transition, workspace, |j, mixed| {
-            let mut moved = *mixed;
-            let own = modes.get(j).copied().unwrap_or_else(|| ScaledNoise::new(dynamics, 1.0));
-            filters[j].predict(rng, &own.times(scales[j]), &mut moved)?;
-            Ok(moved)
-        })
+        self.next.clear();
+        for (j, filter) in self.filters.iter_mut().enumerate() {
+            // Joint probability of having been in mode i and being in mode j.
+            let joint = |i: usize| belief.probabilities[i] * self.transition[i * count + j];
+            let c: f64 = (0..count).map(joint).sum();
+            // Mode j starts from the moments of the mixture of all modes that lead to it. If none does, it keeps its own.
+            let mut moved = if c > 0.0 {
+                moments((0..count).map(|i| (joint(i) / c, &belief.modes[i])))
+            } else {
+                belief.modes[j]
+            };
+            let model = models
+                .get(j)
+                .copied()
+                .unwrap_or_else(|| ScaledNoise::new(dynamics, 1.0));
+            filter.predict(rng, &model.times(self.scales[j]), &mut moved)?;
+            self.next.probabilities.push(c);
+            self.next.modes.push(moved);
+        }
+        check_moments(&self.next.modes)?;
+        std::mem::swap(belief, &mut self.next);
+        Ok(())
     }
 
+    /// Updates each mode and multiplies its probability by its evidence.
     fn update(
         &mut self,
         rng: &mut dyn Rng,
@@ -160,13 +162,30 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> StateFilter<D> for
         observed: &[&dyn Likelihood<D>],
     ) -> Result<Info, Error> {
         self.check(belief)?;
-        let Self { filters, workspace, .. } = self;
-        let log_likelihood = weigh(belief, workspace, |j, mode| {
+        self.next.clear();
+        for ((filter, mode), p) in self.filters.iter_mut().zip(&belief.modes).zip(&belief.probabilities) {
             let mut next = *mode;
-            let info = filters[j].update(rng, &mut next, observed)?;
-            Ok((next, info.log_likelihood))
-        })?;
-        Ok(Info::new(log_likelihood))
+            let log_evidence = match filter.update(rng, &mut next, observed) {
+                Ok(info) => info.log_likelihood,
+                // A mode under which the observation is impossible keeps its Gaussian and gets probability zero. It is an error only if
+                // all modes do.
+                Err(Error::Impossible) => f64::NEG_INFINITY,
+                Err(error) => return Err(error),
+            };
+            self.next.modes.push(next);
+            self.next.probabilities.push(log_evidence + p.ln());
+        }
+        let logs = &mut self.next.probabilities;
+        let peak = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if !peak.is_finite() {
+            return Err(Error::unlikely_or_no_number(peak, "the evidence of a model"));
+        }
+        logs.iter_mut().for_each(|log| *log = (*log - peak).exp());
+        let total: f64 = logs.iter().sum();
+        logs.iter_mut().for_each(|p| *p /= total);
+        check_moments(&self.next.modes)?;
+        std::mem::swap(belief, &mut self.next);
+        Ok(Info::new(peak + total.ln()))
     }
 
     fn mixture(&self, belief: &ImmBelief<D>) -> Option<Vec<(f64, Gaussian<D>)>> {
@@ -211,66 +230,4 @@ fn by_rows(models: usize, transition: &[Vec<f64>]) -> Result<Vec<f64>, ArgumentE
         probabilities("transition", row)?;
     }
     Ok(transition.concat())
-}
-
-/// Mixes the modes by `transition` (row by row) and predicts each: `predict(j, mixed)` is the time update of model `j`.
-fn mix<const D: usize>(
-    belief: &mut ImmBelief<D>,
-    transition: &[f64],
-    workspace: &mut Workspace<D>,
-    mut predict: impl FnMut(usize, &Gaussian<D>) -> Result<Gaussian<D>, Error>,
-) -> Result<(), Error> {
-    let n = belief.modes.len();
-    workspace.modes.clear();
-    workspace.probabilities.clear();
-    for j in 0..n {
-        // Joint probability of having been in mode i and being in mode j.
-        let joint = |i: usize| belief.probabilities[i] * transition[i * n + j];
-        let c: f64 = (0..n).map(joint).sum();
-        // Mode j starts from the moments of the mixture of all modes that lead to it. If none does, it keeps its own.
-        let mixed = if c > 0.0 {
-            moments((0..n).map(|i| (joint(i) / c, &belief.modes[i])))
-        } else {
-            belief.modes[j]
-        };
-        workspace.probabilities.push(c);
-        workspace.modes.push(predict(j, &mixed)?);
-    }
-    check_moments(&workspace.modes)?;
-    std::mem::swap(&mut belief.modes, &mut workspace.modes);
-    std::mem::swap(&mut belief.probabilities, &mut workspace.probabilities);
-    Ok(())
-}
-
-/// Updates each mode and multiplies its probability by its evidence; returns `ln p(observation | past)`. A mode under which the observation
-/// is impossible keeps its Gaussian and gets probability zero.
-fn weigh<const D: usize>(
-    belief: &mut ImmBelief<D>,
-    workspace: &mut Workspace<D>,
-    mut update: impl FnMut(usize, &Gaussian<D>) -> Result<(Gaussian<D>, f64), Error>,
-) -> Result<f64, Error> {
-    workspace.modes.clear();
-    workspace.probabilities.clear();
-    for (j, (mode, p)) in belief.modes.iter().zip(&belief.probabilities).enumerate() {
-        let (next, log_evidence) = match update(j, mode) {
-            Ok(updated) => updated,
-            // A mode under which the observation is impossible gets probability zero. It is an error only if all modes do.
-            Err(Error::Impossible) => (*mode, f64::NEG_INFINITY),
-            Err(error) => return Err(error),
-        };
-        workspace.modes.push(next);
-        workspace.probabilities.push(log_evidence + p.ln());
-    }
-    let logs = &mut workspace.probabilities;
-    let peak = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if !peak.is_finite() {
-        return Err(Error::unlikely_or_no_number(peak, "the evidence of a model"));
-    }
-    logs.iter_mut().for_each(|log| *log = (*log - peak).exp());
-    let total: f64 = logs.iter().sum();
-    logs.iter_mut().for_each(|p| *p /= total);
-    check_moments(&workspace.modes)?;
-    std::mem::swap(&mut belief.modes, &mut workspace.modes);
-    std::mem::swap(&mut belief.probabilities, &mut workspace.probabilities);
-    Ok(peak + total.ln())
 }

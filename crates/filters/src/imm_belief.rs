@@ -35,6 +35,20 @@ impl<const D: usize> TryFrom<Stored<D>> for ImmBelief<D> {
 }
 
 impl<const D: usize> ImmBelief<D> {
+    /// Buffers for a belief, without a model.
+    pub(crate) fn buffers() -> Self {
+        Self {
+            probabilities: Vec::new(),
+            modes: Vec::new(),
+        }
+    }
+
+    /// Takes all models away.
+    pub(crate) fn clear(&mut self) {
+        self.probabilities.clear();
+        self.modes.clear();
+    }
+
     /// A belief with a probability and a Gaussian for each model.
     ///
     /// # Errors
@@ -88,12 +102,8 @@ pub(crate) fn moments<'a, const D: usize>(parts: impl Iterator<Item = (f64, &'a 
 pub(crate) fn check_moments<const D: usize>(modes: &[Gaussian<D>]) -> Result<(), Error> {
     let size = |mode: &Gaussian<D>| mode.mean().norm_squared() + mode.covariance().trace();
     // No distance of two means is larger than twice the larger of their norms.
-    match (4.0 * modes.iter().map(size).sum::<f64>()).is_finite() {
-        true => Ok(()),
-        false => Err(Error::NotANumber {
-            what: "the moments of all models together",
-        }),
-    }
+    let (total, what) = (4.0 * modes.iter().map(size).sum::<f64>(), "the moments of all models together");
+    total.is_finite().then_some(()).ok_or(Error::NotANumber { what })
 }
 
 impl<const D: usize> Belief<D> for ImmBelief<D> {

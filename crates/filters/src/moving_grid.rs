@@ -64,11 +64,8 @@ struct Masses {
 }
 
 impl Masses {
-    fn belief(&self) -> Result<PointMass, Error> {
-        let mut belief =
-            PointMass::new(UniformGrid::from_nodes(self.first, self.spacing, self.masses.len())?, |_| 0.0)?;
-        belief.refill(|density| density.copy_from_slice(&self.masses))?;
-        Ok(belief)
+    fn belief(self) -> Result<PointMass, Error> {
+        PointMass::from_density(UniformGrid::from_nodes(self.first, self.spacing, self.masses.len())?, self.masses)
     }
 
     /// Without the nodes at the ends that have no mass.

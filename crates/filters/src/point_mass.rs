@@ -80,7 +80,7 @@ impl StateFilter<1> for PointMassFilter {
                 let next = moved(grid, dynamics);
                 let used = match kernel.take().filter(|_| *known == next) {
                     Some(kernel) => kernel,
-                    None => TransitionKernel::resolving(*grid, &next)?,
+                    None => TransitionKernel::from_transitions(*grid, &next)?,
                 };
                 *belief = used.predict(belief)?;
                 (*known, *kernel) = (next, Some(used));

@@ -1,12 +1,12 @@
 //! A Rao-Blackwellised particle filter for linear Gaussian states and reports such as bits, cells and silence.
 
-use crate::contract::{Info, StateFilter};
+use crate::contract::{Info, StateFilter, predicted};
 use crate::particle::weigh;
 use crate::{Error, ResamplingRule};
 use fewbits_core::columns::{change_each, count, set_state, state_at};
 use fewbits_core::factor::Scalar;
 use fewbits_core::value_update;
-use fewbits_core::{Cell, FactoredGaussian, Gaussian, GaussianDynamics, Likelihood, LinearScalar};
+use fewbits_core::{Belief, Cell, FactoredGaussian, Gaussian, GaussianDynamics, Likelihood, LinearScalar};
 use fewbits_densities::{GaussianCloud, systematic};
 use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::{LogSum, normal};
@@ -74,13 +74,8 @@ impl<const D: usize> StateFilter<D> for RaoBlackwellised<D> {
     ) -> Result<(), Error> {
         // All particles share one covariance, since the Riccati recursion does not depend on the data.
         let shared = Gaussian::from_trusted_parts(belief.means.mean(), belief.shared_covariance);
-        let moved = dynamics.predict(&shared, 1.0);
         // Checked before resampling, so that a failed prediction leaves the belief as it was.
-        if !moved.is_finite() {
-            return Err(Error::NotANumber {
-                what: "the predicted covariance",
-            });
-        }
+        let moved = predicted(dynamics, &shared)?;
         self.rule.resample(rng, &mut belief.means, &mut self.ancestors)?;
         change_each(belief.means.columns_mut(), |state| dynamics.mean(&state));
         belief.shared_covariance = *moved.covariance();

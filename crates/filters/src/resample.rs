@@ -60,9 +60,7 @@ impl Resampling {
         if !range.contains(&total) {
             let largest = weights.iter().copied().fold(0.0, f64::max);
             let scaled: Vec<f64> = weights.iter().map(|w| w / largest).collect();
-            let (total, last) = check(&scaled)?;
-            self.ancestors_unchecked(rng, &scaled, total, last, ancestors);
-            return Ok(());
+            return self.ancestors(rng, &scaled, ancestors);
         }
         self.ancestors_unchecked(rng, weights, total, last, ancestors);
         Ok(())

@@ -98,11 +98,9 @@ impl<const D: usize> SigmaPointFilter<D> {
         let mut measured: [Vec<f64>; M] = std::array::from_fn(|_| vec![0.0; self.weights.len()]);
         measure(&self.points.each_ref().map(Vec::as_slice), measured.each_mut().map(Vec::as_mut_slice))?;
         let measured = measured.each_ref().map(Vec::as_slice);
-        let predicted = points::moments(&measured, &self.weights);
-        if !predicted.is_finite() {
-            let what = "the predicted measurement (from the sensing model)";
-            return Err(Error::NotANumber { what }.into());
-        }
+        let what = "the predicted measurement (from the sensing model)";
+        let predicted = Some(points::moments(&measured, &self.weights)).filter(Gaussian::is_finite);
+        let predicted = predicted.ok_or(Error::NotANumber { what })?;
         let factor = factor(&predicted)?;
         let states = self.points.each_mut().map(Vec::as_mut_slice);
         let (log_likelihood, _) = points::move_measured_points(states, &self.weights, &measured, &factor)?;
@@ -132,11 +130,10 @@ impl<const D: usize> SigmaPointFilter<D> {
         let mut belief = RootGaussian::known(mean);
         states().for_each(|(x, w)| belief.add((x - mean) * w.sqrt()));
         belief.add_covariance("process noise", extra)?;
-        if belief.is_finite() {
-            return Ok(belief);
-        }
         let what = "the belief (from its points and the models)";
-        Err(Error::NotANumber { what })
+        Some(belief)
+            .filter(RootGaussian::is_finite)
+            .ok_or(Error::NotANumber { what })
     }
 }
 

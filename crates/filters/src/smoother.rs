@@ -10,72 +10,50 @@ mod recorded;
 
 pub use recorded::{Filtered, smooth};
 
-use crate::{Error, kalman};
-use fewbits_core::{Gaussian, GaussianDynamics, LinearDynamics};
-use fewbits_numerics::linalg::solve_semidefinite;
+use crate::Error;
+use fewbits_core::{Gaussian, GaussianDynamics};
+use fewbits_numerics::linalg::{solve_semidefinite, symmetrised};
 use nalgebra::SMatrix;
 
-/// One backward step: the smoothed belief at `n`, from the filtered belief at `n` and the smoothed belief at `n + 1`.
+/// One backward step: the smoothed belief at `n`, from the filtered belief at `n` and the smoothed belief at `n + 1`. Exact for linear
+/// dynamics; others are linearised at the filtered mean `m`.
 ///
 /// ```text
 /// P+ = F P F' + Q
 /// C = P F' P+^-1                                    (pseudo-inverse where P+ is singular)
-/// mean = mean + C (next mean - F mean)
+/// mean = m + C (next mean - f(m))                   (f(m) = F m if linear)
 /// P = (I - C F) P (I - C F)' + C (next P + Q) C'
 /// ```
 ///
 /// # Errors
 /// If a covariance is not symmetric positive semidefinite; [`Error::NotANumber`] if a moment of the result is not finite.
 pub fn smooth_step<const D: usize>(
-    dynamics: &impl LinearDynamics<D>,
+    dynamics: &(impl GaussianDynamics<D> + ?Sized),
     filtered: &Gaussian<D>,
     smoothed_next: &Gaussian<D>,
 ) -> Result<Gaussian<D>, Error> {
-    let predicted = kalman::predict(dynamics, filtered);
-    back(dynamics.transition(), dynamics.noise_covariance(), &predicted, filtered, smoothed_next)
-}
-
-/// The same along any dynamics with Gaussian noise: [`smooth_step`] with the dynamics linearised at the filtered mean, exact if they are linear.
-pub(crate) fn smooth_along<const D: usize>(
-    dynamics: &dyn GaussianDynamics<D>,
-    filtered: &Gaussian<D>,
-    smoothed_next: &Gaussian<D>,
-) -> Result<Gaussian<D>, Error> {
-    let mean = filtered.mean();
+    let (mean, covariance) = (filtered.mean(), filtered.covariance());
     let (transition, noise) = (dynamics.jacobian(mean), dynamics.noise_covariance_at(mean));
-    let covariance = transition * filtered.covariance() * transition.transpose() + noise;
-    let predicted = Gaussian::from_trusted_parts(dynamics.mean(mean), covariance);
-    back(&transition, &noise, &predicted, filtered, smoothed_next)
-}
-
-fn back<const D: usize>(
-    transition: &SMatrix<f64, D, D>,
-    noise: &SMatrix<f64, D, D>,
-    predicted: &Gaussian<D>,
-    filtered: &Gaussian<D>,
-    smoothed_next: &Gaussian<D>,
-) -> Result<Gaussian<D>, Error> {
-    let gain = solve_semidefinite(predicted.covariance(), &(transition * filtered.covariance()))?.transpose();
+    let predicted = symmetrised(&(transition * covariance * transition.transpose() + noise));
+    let gain = solve_semidefinite(&predicted, &(transition * covariance))?.transpose();
     // A sum of positive semidefinite terms, equal to M + C (next P - P+) C', in which nothing cancels.
     let keep = SMatrix::<f64, D, D>::identity() - gain * transition;
     let future = smoothed_next.covariance() + noise;
     let found = Gaussian::from_trusted_parts(
-        filtered.mean() + gain * (smoothed_next.mean() - predicted.mean()),
-        keep * filtered.covariance() * keep.transpose() + gain * future * gain.transpose(),
+        mean + gain * (smoothed_next.mean() - dynamics.mean(mean)),
+        keep * covariance * keep.transpose() + gain * future * gain.transpose(),
     );
     let what = "a smoothed moment";
-    if found.is_finite() {
-        Ok(found)
-    } else {
-        Err(Error::NotANumber { what })
-    }
+    Some(found)
+        .filter(Gaussian::is_finite)
+        .ok_or(Error::NotANumber { what })
 }
 
 #[cfg(test)]
 mod tests {
     use super::smooth_step;
     use crate::kalman;
-    use fewbits_core::{Dynamics, Gaussian, Sensing};
+    use fewbits_core::{Dynamics, Gaussian, LinearDynamics, Sensing};
     use fewbits_models::{LinearSensor, constant_velocity_1d};
     use nalgebra::{DMatrix, DVector, SMatrix, Vector2};
     use rand::SeedableRng;

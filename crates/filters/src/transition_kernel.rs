@@ -1,31 +1,16 @@
 //! Transition densities on a grid, as matrices.
 
 use crate::Error;
-use fewbits_core::{Gaussian, GaussianDynamics, LinearDynamics};
+use fewbits_core::{Gaussian, GaussianDynamics};
 use fewbits_densities::{PointMass, UniformGrid};
 use fewbits_numerics::error::ArgumentError;
 use fewbits_numerics::normal::INV_SQRT_2PI;
-use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::{Matrix1, Vector1};
 
 /// Entries of the kernel at more standard deviations than this are below rounding.
 const REACH: f64 = 8.6;
 /// Widest spacing, in standard deviations of the process noise, at which the trapezoid rule has an error of about 1e-8.
 const COARSEST: f64 = 1.0;
-
-/// If the negative mass of an interpolated density is a larger fraction than this, the grid is too coarse.
-const UNRESOLVED: f64 = 1e-6;
-
-fn too_coarse(grid: &UniformGrid, deviation: f64) -> Error {
-    let expected = format!("a spacing that resolves a deviation of {deviation}");
-    ArgumentError::new("grid", format!("spacing {}", grid.spacing()), expected).into()
-}
-
-/// `sin(pi t) / (pi t)`.
-fn sinc(t: f64) -> f64 {
-    let angle = std::f64::consts::PI * t;
-    if angle.abs() < 1e-8 { 1.0 } else { angle.sin() / angle }
-}
 
 /// The transition density of scalar dynamics on a grid: the time update of [`PointMassFilter`](crate::PointMassFilter) as a matrix, computed
 /// once for dynamics that stay the same, and the exact smoother.
@@ -60,10 +45,9 @@ impl TransitionKernel {
     /// The kernel of dynamics with Gaussian noise that the grid resolves.
     ///
     /// # Errors
-    /// If the noise at some node has a standard deviation below the spacing. For linear dynamics see [`linear`](Self::linear).
+    /// If the noise at some node has a standard deviation below the spacing, or a mean is not finite.
     pub fn new(dynamics: &impl GaussianDynamics<1>, grid: UniformGrid) -> Result<Self, Error> {
-        let moved = moved(&grid, dynamics);
-        Self::resolving(grid, &moved)
+        Self::from_transitions(grid, &moved(&grid, dynamics))
     }
 
     /// The kernel whose transition density from node `i` is normal with mean and standard deviation `moved[i]`: for dynamics that are known
@@ -80,19 +64,10 @@ impl TransitionKernel {
             let expected = "finite means and deviations";
             return Err(ArgumentError::new("moved", format!("({mean}, {deviation})"), expected).into());
         }
-        Self::resolving(grid, moved)
-    }
-
-    /// The kernel whose transition density from node `i` is normal with mean and deviation `moved[i]`.
-    pub(crate) fn resolving(grid: UniformGrid, moved: &[(f64, f64)]) -> Result<Self, Error> {
-        if let Some((_, deviation)) = moved.iter().find(|(_, s)| s.is_nan() || *s < COARSEST * grid.spacing()) {
-            return Err(too_coarse(&grid, *deviation));
+        if let Some((_, deviation)) = moved.iter().find(|(_, s)| *s < COARSEST * grid.spacing()) {
+            let expected = format!("a spacing that resolves a deviation of {deviation}");
+            return Err(ArgumentError::new("grid", format!("spacing {}", grid.spacing()), expected).into());
         }
-        Ok(Self::from_kernel(grid, moved))
-    }
-
-    /// Rows of `h N(x; f(y), Q(y))`, from the pair `(f, sqrt Q)` of each node.
-    fn from_kernel(grid: UniformGrid, moved: &[(f64, f64)]) -> Self {
         // The kernel is stored by rows (next state), but a motion says which rows a column (present state) reaches. First the range of
         // columns of each row, then its entries.
         let mut reach = vec![(grid.points(), 0); grid.points()];
@@ -107,44 +82,6 @@ impl TransitionKernel {
             weights.extend(moved[from.min(to)..to].iter().map(|(mean, deviation)| {
                 let z = (x - mean) / deviation;
                 grid.spacing() * INV_SQRT_2PI / deviation * (-0.5 * z * z).exp()
-            }));
-        }
-        rows.push((0, weights.len()));
-        Self { grid, rows, weights }
-    }
-
-    /// The kernel of `x' = a x + u`, `u ~ N(0, q)`, with any `q`, zero included.
-    ///
-    /// If the noise is narrower than the spacing, `p'(x) = E p((x - u) / a) / |a|` is evaluated between the nodes by
-    /// Whittaker's cardinal series. This is as accurate as the trapezoid rule, but the kernel is a full matrix.
-    ///
-    /// # Errors
-    /// If `a` is zero and the noise is narrower than the spacing.
-    pub fn linear(dynamics: &impl LinearDynamics<1>, grid: UniformGrid) -> Result<Self, Error> {
-        let (a, deviation) = (dynamics.transition()[0], dynamics.noise_covariance()[0].sqrt());
-        let h = grid.spacing();
-        if deviation >= COARSEST * h * a.abs().min(1.0) && deviation > 0.0 {
-            let moved: Vec<(f64, f64)> = grid.nodes().map(|y| (a * y, deviation)).collect();
-            return Ok(Self::from_kernel(grid, &moved));
-        }
-        if a == 0.0 {
-            return Err(too_coarse(&grid, deviation));
-        }
-        let (mut rows, mut weights) = (Vec::with_capacity(grid.points() + 1), Vec::new());
-        // Expectation of sinc over the noise: a sum of cosines up to the highest frequency of the grid, each damped by the noise.
-        let width = deviation / (a.abs() * h);
-        let draws: Vec<(f64, f64)> = if width == 0.0 {
-            vec![(0.0, 1.0)]
-        } else {
-            let normal = |z: f64| INV_SQRT_2PI * (-0.5 * z * z).exp();
-            let panels = gauss_legendre::<32>().panels(-REACH, REACH, 2);
-            panels.map(|(z, w)| (width * z, w * normal(z))).collect()
-        };
-        for x in grid.nodes() {
-            rows.push((0, weights.len()));
-            weights.extend(grid.nodes().map(|y| {
-                let at = (x / a - y) / h;
-                draws.iter().map(|(u, w)| w * sinc(at - u)).sum::<f64>() / a.abs()
             }));
         }
         rows.push((0, weights.len()));
@@ -177,23 +114,12 @@ impl TransitionKernel {
     /// If the belief is on another grid; [`Error::Impossible`] if no mass remains on the grid.
     pub fn predict(&self, belief: &PointMass) -> Result<PointMass, Error> {
         self.check(belief)?;
-        let mut predicted = belief.clone();
-        let (mut kept, mut overshoot) = (0.0, 0.0);
-        predicted.refill(|density| {
-            for (i, p) in density.iter_mut().enumerate() {
-                let (column, row) = self.row(i);
-                let from = &belief.density()[column..column + row.len()];
-                let value: f64 = row.iter().zip(from).map(|(w, q)| w * q).sum();
-                *p = value.max(0.0);
-                kept += *p;
-                overshoot += *p - value;
-            }
-        })?;
-        // A density that the nodes resolve is interpolated without negative values.
-        if overshoot > UNRESOLVED * kept {
-            return Err(too_coarse(&self.grid, belief.variance().sqrt()));
-        }
-        Ok(predicted)
+        let next = |i: usize| -> f64 {
+            let (column, row) = self.row(i);
+            let from = &belief.density()[column..column + row.len()];
+            row.iter().zip(from).map(|(w, q)| w * q).sum()
+        };
+        PointMass::from_density(self.grid, (0..self.grid.points()).map(next).collect())
     }
 
     /// The smoothed density: the filtered density times the likelihood of all later observations.
@@ -320,39 +246,6 @@ mod tests {
                 (scaled.mean() - plain.mean()).abs() < 1e-12 && (scaled.variance() - plain.variance()).abs() < 1e-12
             );
         }
-    }
-
-    /// Issue: the grid filters refused noise-free dynamics.
-    #[test]
-    fn narrow_noise_and_none_agree_with_kalman() {
-        for (a, q) in [
-            (0.9, 0.0),
-            (-0.8, 0.0),
-            (1.0, 0.0),
-            (1.1, 1e-3),
-            (0.7, 0.01),
-            (0.3, 0.005),
-        ] {
-            let dynamics = Ar1::new_unstable(a, q).unwrap();
-            let sensing = LinearSensor::direct(4.0).unwrap();
-            let kernel = TransitionKernel::linear(&dynamics, UniformGrid::symmetric(20.0, 0.12).unwrap()).unwrap();
-            let mut exact = PointMass::normal(*kernel.grid(), 0.4, 2.0).unwrap();
-            let mut belief = Gaussian::scalar(0.4, 2.0).unwrap();
-            for z in [1.0, -0.5] {
-                exact = kernel.predict(&exact).unwrap();
-                let evidence = exact.update_with(|x| log_pdf_with(z, x, 4.0)).unwrap();
-                let (next, info) = kalman::step(&dynamics, &sensing, &belief, &Vector1::new(z)).unwrap();
-                belief = next;
-                assert!((evidence - info.log_likelihood).abs() < 1e-9, "{a} {q}");
-                assert!((exact.mean() - belief.mean()[0]).abs() < 1e-9, "{a} {q}");
-                assert!((exact.variance() - belief.covariance()[0]).abs() < 1e-9, "{a} {q}");
-            }
-        }
-        let grid = UniformGrid::symmetric(5.0, 0.25).unwrap();
-        assert!(TransitionKernel::linear(&Ar1::new(0.0, 0.0).unwrap(), grid).is_err());
-        let still = TransitionKernel::linear(&Ar1::new(0.9, 0.0).unwrap(), grid).unwrap();
-        let narrow = PointMass::normal(grid, 0.1, 0.005).unwrap();
-        assert!(still.predict(&narrow).is_err(), "a density between the nodes is an error, not a wrong answer");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! `cargo run -p fewbits-handoff --example a_belief_that_travels`
 
 use fewbits_core::factor::Value;
-use fewbits_core::{Dynamics, Gaussian, Observed, Sensing};
+use fewbits_core::{Belief, Dynamics, Gaussian, LinearSensing, Observed, Sensing};
 use fewbits_densities::Mixture;
 use fewbits_handoff::{Components, HandoffFilter};
 use fewbits_models::{ScalarSensor, constant_velocity_1d};

@@ -2,7 +2,7 @@
 
 use crate::{Coded, HandoffFilter};
 use fewbits_core::rand::Rng;
-use fewbits_core::{BitString, Dynamics, Likelihood, Message};
+use fewbits_core::{Belief, BitString, Dynamics, Likelihood, Message};
 use fewbits_densities::Mixture;
 use fewbits_mixture_codec::wire::CodedMixture;
 use fewbits_protocol::{BoxError, Lead, Leader};

@@ -9,6 +9,7 @@
 //! - [`Leaders`]: the same with messages as bits from node to node, over any network that runs the walks of `fewbits-protocol`.
 //!
 //! ```
+//! use fewbits_core::Belief;
 //! use fewbits_core::factor::Value;
 //! use fewbits_core::{Gaussian, Observed};
 //! use fewbits_densities::Mixture;

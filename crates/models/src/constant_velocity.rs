@@ -43,7 +43,7 @@ fn axis(interval: f64) -> Result<(Matrix2<f64>, Vector2<f64>), Error> {
 #[cfg(test)]
 mod tests {
     use super::{constant_velocity_1d, constant_velocity_2d};
-    use fewbits_core::Dynamics;
+    use fewbits_core::{Dynamics, LinearDynamics};
     use nalgebra::{Matrix2, Vector4};
 
     #[test]

@@ -89,11 +89,6 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
         }
     }
 
-    /// Transition `F`.
-    pub fn transition(&self) -> &SMatrix<f64, D, D> {
-        &self.transition
-    }
-
     /// Noise gain `G`.
     pub fn gain(&self) -> &SMatrix<f64, D, U> {
         &self.gain
@@ -102,11 +97,6 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
     /// Noise variances `q`.
     pub fn noise_variances(&self) -> &SVector<f64, U> {
         &self.noise_variances
-    }
-
-    /// `Q = G diag(q) G'`, possibly singular.
-    pub fn noise_covariance(&self) -> &SMatrix<f64, D, D> {
-        &self.noise_covariance
     }
 
     /// Covariance of the stationary distribution: the solution of `P = F P F' + Q`.
@@ -247,6 +237,7 @@ fn add_multiple(sum: &mut [f64], factor: f64, x: &[f64]) {
 mod tests {
     use super::LinearGaussian;
     use crate::Error;
+    use fewbits_core::LinearDynamics;
     use nalgebra::{Matrix1, Matrix2, Vector1};
 
     fn rotation(scale: f64) -> Matrix2<f64> {

@@ -59,16 +59,6 @@ impl<const D: usize, const M: usize> LinearSensor<D, M> {
             noise_factor,
         })
     }
-
-    /// Measurement matrix `H`.
-    pub fn matrix(&self) -> &SMatrix<f64, M, D> {
-        &self.matrix
-    }
-
-    /// Noise covariance `R`.
-    pub fn noise_covariance(&self) -> &SMatrix<f64, M, M> {
-        &self.noise_covariance
-    }
 }
 
 impl<const D: usize> ScalarSensor<D> {

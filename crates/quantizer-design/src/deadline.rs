@@ -53,15 +53,6 @@ impl Deadline {
         speed: f64::INFINITY,
     };
 
-    /// A deadline that is over.
-    pub(crate) fn over(clock: Clock) -> Self {
-        Self {
-            clock,
-            end: Some(Duration::ZERO),
-            speed: 0.0,
-        }
-    }
-
     /// The moment `limit` after `start`. Never, if there is no limit or the sum overflows.
     pub(crate) fn after(clock: Clock, start: Duration, limit: Option<Duration>, speed: f64) -> Self {
         let end = limit.and_then(|limit| start.checked_add(limit));

@@ -49,13 +49,10 @@ pub fn use_words(
             let found =
                 |(row, index): (usize, &Option<u32>)| Some((row, index.map(|index| index as usize).filter(is_other)?));
             if let Some((row, index)) = cells.iter().enumerate().find_map(found) {
-                return Err(fewbits_table::Error::Cell {
-                    place: batch.places.get(row).copied().unwrap_or_default(),
-                    column: table.columns()[column].name.clone(),
-                    cell: known.get(index).cloned().unwrap_or_default(),
-                    problem: "is none of the words of the column",
-                    mend: "mend the cell, or leave the row out with --skip-bad".to_owned(),
-                });
+                let cell = known.get(index).cloned().unwrap_or_default();
+                let mend = "mend the cell, or leave the row out with --skip-bad";
+                let column = &table.columns()[column].name;
+                return Err(refused(batch, row, column, cell, "is none of the words of the column", mend));
             }
         }
         table.fix_words(column, words);
@@ -77,11 +74,23 @@ pub fn time_refused(
     };
     let name = column
         .and_then(|column| table.columns().get(column))
-        .map(|column| column.name.clone());
+        .map(|column| column.name.as_str());
+    refused(batch, row, name.unwrap_or_default(), time.shown(scale, time.decimals()), problem, mend)
+}
+
+/// The refusal of a cell in this row of a batch.
+fn refused(
+    batch: &fewbits_table::Batch,
+    row: usize,
+    column: &str,
+    cell: String,
+    problem: &'static str,
+    mend: &str,
+) -> fewbits_table::Error {
     fewbits_table::Error::Cell {
         place: batch.places.get(row).copied().unwrap_or_default(),
-        column: name.unwrap_or_default(),
-        cell: time.shown(scale, time.decimals()),
+        column: column.to_owned(),
+        cell,
         problem,
         mend: mend.to_owned(),
     }
@@ -125,12 +134,10 @@ pub fn cell(
         if let Cells::Integers(cells) = cells {
             return Ok(cells[row].map(|number| integers.code(number)));
         }
-        let refused = |cell: String| fewbits_table::Error::Cell {
-            place: batch.places.get(row).copied().unwrap_or_default(),
-            column: table.columns()[table.selected()[index]].name.clone(),
-            cell,
-            problem: "is no whole number of 64 bits, as all others of the recording's column",
-            mend: "mend the cell, or pack the table into a recording of its own".to_owned(),
+        let refused = |cell: String| {
+            let problem = "is no whole number of 64 bits, as all others of the recording's column";
+            let mend = "mend the cell, or pack the table into a recording of its own";
+            refused(batch, row, &table.columns()[table.selected()[index]].name, cell, problem, mend)
         };
         return match cells.number(row).map_err(refused)? {
             None => Ok(None),
@@ -174,13 +181,8 @@ fn cell_refused(
             "pack a file instead of a pipe, or into a recording of its own; or leave the column out with --without",
         ),
     };
-    fewbits_table::Error::Cell {
-        place: batch.places.get(row).copied().unwrap_or_default(),
-        column: name.to_owned(),
-        cell: text,
-        problem,
-        mend: mend.replace("--without", &format!("--without {}", names::as_argument([name]))),
-    }
+    let mend = mend.replace("--without", &format!("--without {}", names::as_argument([name])));
+    refused(batch, row, name, text, problem, &mend)
 }
 
 /// Rows of the selected columns of a table.

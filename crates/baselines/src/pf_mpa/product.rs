@@ -4,6 +4,7 @@
 //! `J = sum S_l^-1`, `h = sum S_l^-1 m_l`, mean `J^-1 h`, covariance `J^-1` and a weight in closed form. This is exact if the labels can
 //! be enumerated; otherwise one draws from the product.
 
+use fewbits_core::Belief;
 use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::factored::Factored;

@@ -326,6 +326,7 @@ fn exact<const D: usize, R: Rng + ?Sized>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fewbits_core::Belief;
     use fewbits_densities::Component;
     use fewbits_monte_carlo::{Moments, Stream};
     use nalgebra::Matrix2;

@@ -196,6 +196,7 @@ fn propose<R: Rng>(rng: &mut R, mean: &Vector2<f64>, spread: f64, observed: &[Ra
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fewbits_core::Belief;
     use nalgebra::{Matrix4, Vector4};
 
     #[test]

@@ -1,7 +1,7 @@
 //! A target that manoeuvres: constant velocity with white acceleration noise and an acceleration that jumps between three values.
 
 use crate::pf_mpa::chain::AccelerationChain;
-use fewbits_core::{Dynamics, Gaussian};
+use fewbits_core::{Belief, Dynamics, Gaussian};
 use fewbits_densities::Particles;
 use fewbits_filters::{Imm, MomentFilter, Switching};
 use fewbits_models::{AffineGaussian, LinearGaussian};

@@ -3,6 +3,7 @@
 use crate::common::{lobe, random_mixture};
 use fewbits_baselines::pf_mpa::ProductSampler;
 use fewbits_baselines::pf_mpa::product::exact;
+use fewbits_core::Belief;
 use fewbits_densities::{Component, Mixture};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix1, SVector, Vector1};

@@ -1,6 +1,7 @@
 //! Quadrature against closed forms.
 
 use fewbits_baselines::mixture_codec::quadrature::{QuadratureGrid, integrated};
+use fewbits_core::Belief;
 use fewbits_densities::{Component, Mixture};
 use nalgebra::{SMatrix, SVector};
 

@@ -7,7 +7,7 @@ use fewbits_baselines::cfwmd::trigger::StochasticTrigger;
 use fewbits_cfwmd::ellipsoid::Ellipsoid;
 use fewbits_cfwmd::rule::{OwnRecursion, OwnStep};
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{Factor, Gaussian, Sensing};
+use fewbits_core::{Factor, Gaussian, LinearSensing, Sensing};
 use fewbits_filters::kalman;
 use fewbits_models::{LinearSensor, ReceivedPower, constant_velocity_1d};
 use fewbits_numerics::normal;

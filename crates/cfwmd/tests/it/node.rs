@@ -3,7 +3,7 @@
 use fewbits_cfwmd::no_feedback::LocalSensor;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::scheme::CovarianceFeedback;
-use fewbits_core::{Gaussian, NumberFormat};
+use fewbits_core::{Gaussian, LinearDynamics, LinearSensing, NumberFormat};
 use fewbits_models::{LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::Stream;
 use fewbits_node::censor::{OwnFilter, half_width};

@@ -11,7 +11,10 @@ use fewbits_core::laws::factor::tilted_is_quadrature;
 use fewbits_core::laws::message::{decoding_is_total, round_trip};
 use fewbits_core::laws::scheme::{deterministic, honesty, total_probability, total_probability_with};
 use fewbits_core::number::EvenLevels;
-use fewbits_core::{BitString, Deterministic, Factor, Gaussian, Link, NumberFormat, Observation, Scheme, Sensing};
+use fewbits_core::{
+    BitString, Deterministic, Factor, Gaussian, LinearDynamics, LinearSensing, Link, NumberFormat, Observation, Scheme,
+    Sensing,
+};
 use fewbits_models::{LinearSensor, ReceivedPower, ScalarSensor, constant_velocity_1d};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::quadrature::gauss_legendre;

@@ -1,7 +1,7 @@
 //! A probability density over several numbers, given by its values on a lattice.
 
 use super::axis::UniformGrid;
-use super::line::{absorb, normalise};
+use super::line::{absorb, normalised};
 use crate::Error;
 use fewbits_numerics::error::{entries, finite, positive, refuse};
 use fewbits_numerics::normal::log_pdf_with;
@@ -44,8 +44,7 @@ impl Lattice {
                 "spacings whose product is a normal number",
             );
         }
-        let mut density = vec![1.0; nodes];
-        normalise(&mut density, volume)?;
+        let density = normalised(vec![1.0; nodes], nodes, volume)?;
         Ok(Self { axes, volume, density })
     }
 
@@ -143,15 +142,10 @@ impl Lattice {
     ///
     /// # Errors
     /// If there is not one per node, or one is negative or not finite; [`Error::Impossible`] if all are zero.
-    pub fn with_density(&self, mut density: Vec<f64>) -> Result<Self, Error> {
-        entries("density", density.len(), self.density.len())?;
-        if let Some(bad) = density.iter().find(|p| !(**p >= 0.0 && p.is_finite())) {
-            return refuse("density", bad, "finite numbers, 0 or above");
-        }
-        normalise(&mut density, self.volume)?;
+    pub fn with_density(&self, density: Vec<f64>) -> Result<Self, Error> {
         Ok(Self {
             axes: self.axes.clone(),
-            density,
+            density: normalised(density, self.density.len(), self.volume)?,
             ..*self
         })
     }

@@ -68,14 +68,18 @@ pub(crate) fn absorb(density: &mut [f64], logs: &[f64], volume: f64) -> Result<f
     Ok(sum.ln() + peak + volume.ln())
 }
 
-/// Divides a density by its integral; each node has the given volume.
-pub(crate) fn normalise(density: &mut [f64], volume: f64) -> Result<(), Error> {
+/// The density at so many nodes of a volume each that is proportional to these numbers.
+pub(crate) fn normalised(mut density: Vec<f64>, nodes: usize, volume: f64) -> Result<Vec<f64>, Error> {
+    entries("density", density.len(), nodes)?;
+    if let Some(bad) = density.iter().find(|p| !(**p >= 0.0 && p.is_finite())) {
+        return refuse("density", bad, "finite numbers, 0 or above");
+    }
     let total = density.iter().sum::<f64>() * volume;
     if !(total > 0.0 && total.is_finite()) {
         return Err(Error::Impossible);
     }
     density.iter_mut().for_each(|p| *p /= total);
-    Ok(())
+    Ok(density)
 }
 
 impl PointMass {
@@ -90,6 +94,15 @@ impl PointMass {
         };
         mass.update_with(log_density)?;
         Ok(mass)
+    }
+
+    /// The density proportional to these numbers at the nodes.
+    ///
+    /// # Errors
+    /// If there is not one per node, or one is negative or not finite; [`Error::Impossible`] if all are zero.
+    pub fn from_density(grid: UniformGrid, density: Vec<f64>) -> Result<Self, Error> {
+        let density = normalised(density, grid.points(), grid.spacing())?;
+        Ok(Self { grid, density })
     }
 
     /// A normal density, evaluated at the nodes.
@@ -179,20 +192,6 @@ impl PointMass {
             *p *= l / evidence;
         }
         Ok(evidence)
-    }
-
-    /// Replaces the density: `fill` writes one value per node, up to a common factor; the result is normalised.
-    ///
-    /// # Errors
-    /// [`Error::Impossible`] if all values are zero. The density is then unchanged.
-    pub fn refill(&mut self, fill: impl FnOnce(&mut [f64])) -> Result<(), Error> {
-        let before = self.density.clone();
-        fill(&mut self.density);
-        let done = normalise(&mut self.density, self.grid.spacing());
-        if done.is_err() {
-            self.density = before;
-        }
-        done
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::particles::Particles;
+use fewbits_core::Belief;
 use fewbits_numerics::error::{non_negative, positive, refuse};
 use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};

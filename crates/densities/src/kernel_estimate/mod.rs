@@ -99,16 +99,6 @@ impl<const D: usize> KernelEstimate<D> {
         &self.white
     }
 
-    /// Mean.
-    pub fn mean(&self) -> SVector<f64, D> {
-        self.particles.mean()
-    }
-
-    /// Covariance: the sample's plus the kernel's.
-    pub fn covariance(&self) -> SMatrix<f64, D, D> {
-        self.particles.covariance() + self.kernel
-    }
-
     /// `ln p(x)`, never NaN for finite `x`.
     pub fn log_pdf(&self, x: &SVector<f64, D>) -> f64 {
         let columns: [[f64; 1]; D] = std::array::from_fn(|d| [x[d]]);
@@ -227,7 +217,13 @@ fn whitened<const D: usize>(
 }
 
 impl<const D: usize> Belief<D> for KernelEstimate<D> {
-    crate::own_moments!();
+    fn mean(&self) -> SVector<f64, D> {
+        self.particles.mean()
+    }
+
+    fn covariance(&self) -> SMatrix<f64, D, D> {
+        self.particles.covariance() + self.kernel
+    }
 
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
         let drawn = states.each_mut().map(|column| &mut **column);

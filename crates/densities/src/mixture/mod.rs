@@ -21,6 +21,7 @@ use serde::{Deserialize, Serialize};
 /// A density `sum_k w_k N(x; m_k, S_k)` over `R^D` with weights that sum to one.
 ///
 /// ```
+/// use fewbits_core::Belief;
 /// use fewbits_densities::{Component, Mixture};
 /// use nalgebra::{Matrix1, Vector1};
 /// let lobe = |w, m| Component::new(w, Vector1::new(m), Matrix1::new(0.25));
@@ -73,16 +74,6 @@ impl<const D: usize> Mixture<D> {
     #[expect(clippy::len_without_is_empty, reason = "never empty")]
     pub fn len(&self) -> usize {
         self.components.len()
-    }
-
-    /// Mean.
-    pub fn mean(&self) -> SVector<f64, D> {
-        self.components.iter().map(|c| c.mean() * c.weight).sum()
-    }
-
-    /// Covariance: the mean of the components' covariances plus the covariance of their means.
-    pub fn covariance(&self) -> SMatrix<f64, D, D> {
-        *self.moment_matched().covariance()
     }
 
     /// The Gaussian of the same mean and covariance.
@@ -195,7 +186,13 @@ fn log_sum_rows(terms: &[f64], out: &mut [f64]) {
 }
 
 impl<const D: usize> Belief<D> for Mixture<D> {
-    crate::own_moments!();
+    fn mean(&self) -> SVector<f64, D> {
+        self.components.iter().map(|c| c.mean() * c.weight).sum()
+    }
+
+    fn covariance(&self) -> SMatrix<f64, D, D> {
+        *self.moment_matched().covariance()
+    }
 
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
         change_each(states, |_| self.sample(rng));

@@ -31,6 +31,7 @@ use weights::{gather_rows, normalise};
 /// particles are selected. Examples: a sensor's estimate given the particle's history, a label, a statistic.
 ///
 /// ```
+/// use fewbits_core::Belief;
 /// use fewbits_densities::Particles;
 /// let belief = Particles::new([vec![0.0, 1.0, 4.0]], &[0.0, 0.0, f64::NEG_INFINITY])?;
 /// assert_eq!(belief.mean()[0], 0.5);
@@ -256,11 +257,6 @@ impl<const D: usize> Particles<D> {
         self.effective_sample_size = count as f64;
     }
 
-    /// Weighted mean.
-    pub fn mean(&self) -> SVector<f64, D> {
-        SVector::from_fn(|d, _| dot(&self.weights, &self.columns[d]))
-    }
-
     /// Weighted covariance `sum w (x - mean)(x - mean)^T` about a given mean, without a small-sample correction.
     pub fn covariance_about(&self, mean: &SVector<f64, D>) -> SMatrix<f64, D, D> {
         let w = self.weights.as_slice();
@@ -273,11 +269,6 @@ impl<const D: usize> Particles<D> {
             }
         }
         covariance
-    }
-
-    /// Weighted covariance about the mean.
-    pub fn covariance(&self) -> SMatrix<f64, D, D> {
-        self.covariance_about(&self.mean())
     }
 }
 
@@ -311,7 +302,13 @@ impl<const D: usize> PartialEq for Particles<D> {
 }
 
 impl<const D: usize> Belief<D> for Particles<D> {
-    crate::own_moments!();
+    fn mean(&self) -> SVector<f64, D> {
+        SVector::from_fn(|d, _| dot(&self.weights, &self.columns[d]))
+    }
+
+    fn covariance(&self) -> SMatrix<f64, D, D> {
+        self.covariance_about(&self.mean())
+    }
 
     /// Each draw is a particle, chosen with probability equal to its weight.
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {

@@ -1,7 +1,7 @@
 //! The laws of beliefs, on every density of this crate; marginals; ellipses.
 
 use crate::common::{crescent, d1, random_mixture};
-use fewbits_core::{Density, Gaussian, laws};
+use fewbits_core::{Belief, Density, Gaussian, laws};
 use fewbits_densities::{Component, KernelEstimate, Mixture, PointMass, UniformGrid, ellipse};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix1, Matrix2, SMatrix, SVector, Vector1, Vector2};

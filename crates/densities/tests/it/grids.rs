@@ -145,15 +145,17 @@ fn what_is_impossible_leaves_a_density_behind() {
     let mut sided = PointMass::new(grid, |x| if x < 0.6 { 0.0 } else { f64::NEG_INFINITY }).unwrap();
     let evidence = sided.update_with(|x| if x < 0.6 { -2000.0 } else { 500.0 });
     assert!((evidence.unwrap() + 2000.0).abs() < 1e-9 && (sided.density()[0] - 1.0).abs() < 1e-15);
-    belief
-        .refill(|density| density.copy_from_slice(&[0.0, 1.0, 2.0, 1.0, 0.0]))
-        .unwrap();
+    let belief = PointMass::from_density(grid, vec![0.0, 1.0, 2.0, 1.0, 0.0]).unwrap();
     assert_eq!(belief.density(), [0.0, 0.5, 1.0, 0.5, 0.0]);
     assert_eq!((belief.mean(), belief.variance()), (1.0, 0.125));
-    assert!(belief.refill(|density| density.fill(0.0)).is_err());
-    assert_eq!(belief.density(), [0.0, 0.5, 1.0, 0.5, 0.0]);
-    assert!(belief.refill(|density| density.fill(f64::INFINITY)).is_err());
-    assert_eq!(belief.density(), [0.0, 0.5, 1.0, 0.5, 0.0]);
+    for bad in [
+        vec![0.0; 5],
+        vec![f64::INFINITY; 5],
+        vec![-1.0, 1.0, 1.0, 1.0, 1.0],
+        vec![1.0; 4],
+    ] {
+        assert!(PointMass::from_density(grid, bad).is_err());
+    }
 }
 
 /// Defect: the density at a distance whose quotient by the spacing overflows was NaN.

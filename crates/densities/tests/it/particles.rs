@@ -1,5 +1,6 @@
 //! Particles against sums written out by hand.
 
+use fewbits_core::Belief;
 use fewbits_densities::{Error, Particles};
 use proptest::prelude::*;
 
@@ -98,7 +99,7 @@ fn storage_round_trips_and_checks() {
 
 #[test]
 fn particles_and_clouds_give_back_what_they_were_made_of() {
-    use fewbits_core::{Belief, Gaussian};
+    use fewbits_core::Gaussian;
     use fewbits_densities::GaussianCloud;
     use nalgebra::{Matrix2, Vector2};
     let (x, y, logs) = (vec![1.0, 4.0, -2.0], vec![0.5, -1.5, 3.0], [0.2, -0.7, 1.1]);

@@ -1,7 +1,9 @@
 //! The laws of schemes, on every scheme of this crate and all kinds of links.
 
 use fewbits_core::laws::{factor, message, scheme};
-use fewbits_core::{Deterministic, Error, Gaussian, Link, Message, Observation, Quantized, Scheme, Sign};
+use fewbits_core::{
+    Deterministic, Error, Gaussian, LinearSensing, Link, Message, Observation, Quantized, Scheme, Sign,
+};
 use fewbits_dymbo::{
     CellIndex, DymboFilter, InnovationWord, MultibitFilter, Multiple, Prediction, RoundedSample, ScalarFilter,
     ScalarPlant, SignBit,

@@ -9,6 +9,7 @@ use super::setting::{Linear, Setting};
 use crate::prelude::*;
 use fewbits_baselines::cfwmd::Weighing;
 use fewbits_baselines::cfwmd::information::fisher_information;
+use fewbits_core::LinearDynamics;
 use fewbits_filters::cramer_rao;
 use fewbits_models::constant_velocity_1d;
 use fewbits_numerics::normal;

@@ -12,7 +12,7 @@ use fewbits_cfwmd::no_feedback::{JointBelief, LocalSensor, joint};
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion, OwnStep};
 use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{Likelihood, NumberFormat, Scheme as _};
+use fewbits_core::{Likelihood, LinearSensing, NumberFormat, Scheme as _};
 use fewbits_densities::Particles;
 use fewbits_filters::{BootstrapFilter, Resampling, ResamplingRule, Schedule, StateFilter, assumed_density, kalman};
 use fewbits_models::{LinearGaussian, LinearSensor, constant_velocity_1d};
@@ -342,7 +342,7 @@ impl<const M: usize> Line<M> {
                 let direction = (inverse * step.predicted * h.transpose()).transpose();
                 let own = step.predicted * h.transpose();
                 let variance = h * own - direction * own;
-                let noise = variance.map(|v| v.max(0.0)) + sensor.noise_covariance();
+                let noise = variance.map(|v| v.max(0.0)) + LinearSensing::noise_covariance(sensor);
                 Some((direction, direction * prior.mean(), noise))
             }
             _ => None,

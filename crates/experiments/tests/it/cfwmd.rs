@@ -6,7 +6,7 @@ use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::threshold::{Budget, threshold};
 use fewbits_core::factor::{self, Levels, Scalar};
-use fewbits_core::{Cell, Dynamics, Gaussian, Likelihood, Link, Observed, Sensing};
+use fewbits_core::{Belief, Cell, Dynamics, Gaussian, Likelihood, Link, Observed, Sensing};
 use fewbits_densities::GaussianCloud;
 use fewbits_experiments::schema::Value;
 use fewbits_experiments::{Context, Measured, all};

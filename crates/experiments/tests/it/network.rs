@@ -4,7 +4,7 @@ use fewbits_adaptive::{Config, Receiver as Following, Sensor};
 use fewbits_baselines::over_bits::{Estimator, OverBits};
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, PatternSensor, Source};
 use fewbits_core::factor::Levels;
-use fewbits_core::{Cell, Dynamics, Gaussian, Observation, Sensing, SensorNode};
+use fewbits_core::{Cell, Dynamics, Gaussian, LinearSensing, Observation, Sensing, SensorNode};
 use fewbits_experiments::network::receivers::{Followers, LookUp, each};
 use fewbits_experiments::network::schemes;
 use fewbits_experiments::network::worlds::{self, COEFFICIENT, Entry, floor_at};

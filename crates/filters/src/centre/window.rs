@@ -4,7 +4,7 @@
 use super::FusionCentre;
 use crate::Error;
 use crate::contract::StateFilter;
-use crate::smoother::smooth_along;
+use crate::smoother::smooth_step;
 use fewbits_core::{Belief, Gaussian, GaussianDynamics, ScaledNoise};
 use fewbits_numerics::error::{finite, refuse};
 use rand::Rng;
@@ -31,7 +31,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         for k in (0..filtered.len().saturating_sub(1)).rev() {
             let dynamics = self.world.over(filtered[k + 1].0 - filtered[k].0)?;
             let dynamics = ScaledNoise::new(&*dynamics, self.noise_scale);
-            filtered[k].1 = smooth_along(&dynamics, &filtered[k].1, &filtered[k + 1].1)?;
+            filtered[k].1 = smooth_step(&dynamics, &filtered[k].1, &filtered[k + 1].1)?;
         }
         Ok(filtered)
     }

@@ -134,7 +134,7 @@ impl Grid {
             origin,
             lower: factor.l(),
         };
-        let (posterior, log_likelihood) = self.posterior(&prior, observed, workspace)?;
+        let posterior = self.posterior(&prior, observed, workspace)?;
 
         let (gain, keep) = regression(predicted.covariance(), &axes, &factor);
         let moved = congruence(&(gain * prior.lower), &symmetrised(&posterior.covariance));
@@ -143,7 +143,7 @@ impl Grid {
         if !updated.is_finite() {
             return Err(Error::Impossible);
         }
-        Ok((updated, log_likelihood))
+        Ok((updated, posterior.log_evidence))
     }
 
     /// Evaluates grids until all parts of the posterior are resolved, and combines their moments.
@@ -152,7 +152,7 @@ impl Grid {
         prior: &Prior<K>,
         observed: &(impl Likelihood<K> + ?Sized),
         workspace: &mut Workspace<K>,
-    ) -> Result<(Moments<K>, f64), Error> {
+    ) -> Result<Piece<K>, Error> {
         workspace.pieces.clear();
         workspace.regions.clear();
         workspace.regions.push(Region::whole(self.nodes));
@@ -163,8 +163,7 @@ impl Grid {
             let found = self.pass(prior, &region, observed, workspace)?;
             // The posterior is zero in this region.
             let Some(found) = found else { continue };
-            let best = workspace.pieces.iter().map(|piece| piece.log_evidence);
-            let best = best.fold(f64::NEG_INFINITY, f64::max);
+            let best = best_of(&workspace.pieces);
             if found.is_done(&region, self.reach) {
                 workspace.pieces.push(found.piece(&region));
             } else if found.is_below(&region, best, DROPPED) {
@@ -183,28 +182,32 @@ impl Grid {
                 workspace.regions.push(region.narrowed(&found));
             }
         }
-        let peak = workspace
-            .pieces
-            .iter()
-            .fold(f64::NEG_INFINITY, |peak, piece| peak.max(piece.log_evidence));
+        let peak = best_of(&workspace.pieces);
         if peak == f64::NEG_INFINITY {
             return Err(Error::Impossible);
         }
         // Moments of the mixture of all parts, each weighted by its evidence.
-        let shares = || {
-            workspace
-                .pieces
-                .iter()
-                .map(|piece| (piece, (piece.log_evidence - peak).exp()))
-        };
+        let pieces = &workspace.pieces;
+        let shares = || pieces.iter().map(|piece| (piece, (piece.log_evidence - peak).exp()));
         let total: f64 = shares().map(|(_, share)| share).sum();
         let mean = shares().fold(SVector::zeros(), |sum, (piece, share)| sum + piece.mean * (share / total));
         let covariance = shares().fold(SMatrix::zeros(), |sum, (piece, share)| {
             let offset = piece.mean - mean;
             sum + (piece.covariance + offset * offset.transpose()) * (share / total)
         });
-        Ok((Moments { mean, covariance }, peak + total.ln()))
+        let log_evidence = peak + total.ln();
+        Ok(Piece {
+            log_evidence,
+            mean,
+            covariance,
+        })
     }
+}
+
+/// The largest logarithm of an evidence, `-inf` of no piece.
+fn best_of<const K: usize>(pieces: &[Piece<K>]) -> f64 {
+    let logs = pieces.iter().map(|piece| piece.log_evidence);
+    logs.fold(f64::NEG_INFINITY, f64::max)
 }
 
 fn unresolved<const K: usize>(found: &pass::Found<K>) -> Error {
@@ -219,10 +222,4 @@ fn unresolved<const K: usize>(found: &pass::Found<K>) -> Error {
 struct Prior<const K: usize> {
     origin: SVector<f64, K>,
     lower: SMatrix<f64, K, K>,
-}
-
-/// Mean and covariance of `u`.
-struct Moments<const K: usize> {
-    mean: SVector<f64, K>,
-    covariance: SMatrix<f64, K, K>,
 }

@@ -1,6 +1,6 @@
 //! A whole recording of filtered beliefs, smoothed at once or with a lag.
 
-use super::smooth_along;
+use super::smooth_step;
 use fewbits_core::{Error, Evolution, Gaussian, ScaledNoise};
 use fewbits_numerics::error::refuse;
 
@@ -75,7 +75,7 @@ fn back<const D: usize>(
         } else {
             let dynamics = world.over(after.seconds - one.seconds)?;
             let dynamics = ScaledNoise::new(&*dynamics, after.noise_scale);
-            smooth_along(&dynamics, &one.belief, &next)?
+            smooth_step(&dynamics, &one.belief, &next)?
         };
         found.push(next);
     }

@@ -1,7 +1,7 @@
 //! Smoothing of particles against Rauch, Tung and Striebel's.
 
 use fewbits_core::factor::Value;
-use fewbits_core::{Gaussian, GaussianDynamics, Observed};
+use fewbits_core::{Belief, Gaussian, GaussianDynamics, Observed};
 use fewbits_filters::smoother::smooth_step;
 use fewbits_filters::{BootstrapFilter, ResamplingRule, StateFilter, backward_simulation, kalman};
 use fewbits_models::{Ar1, LinearSensor, constant_velocity_1d};

@@ -1,7 +1,7 @@
 //! Law of every filter: what is impossible is an error of one name, and leaves the belief as it was, to the last bit.
 
 use fewbits_core::factor::{Constant, Levels, Scalar};
-use fewbits_core::{Cell, Gaussian, Likelihood, Observed};
+use fewbits_core::{Cell, Gaussian, Likelihood, LinearSensing, Observed};
 use fewbits_filters::{
     BootstrapFilter, Error, GaussianCloud, Particles, PointMass, RaoBlackwellised, Resampling, ResamplingRule,
     Schedule, StateFilter, TransitionKernel, UniformGrid, assumed_density,

@@ -5,7 +5,7 @@ use fewbits_core::{Belief, Cell, Gaussian, Likelihood, Observed};
 use fewbits_filters::{
     BootstrapFilter, Error, MomentFilter, PointMassFilter, ResamplingRule, StateFilter, UniformGrid,
 };
-use fewbits_models::{ContinuousLinear, LinearSensor};
+use fewbits_models::{Ar1, ContinuousLinear, LinearSensor};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
@@ -122,4 +122,34 @@ fn what_cannot_be_leaves_the_belief_as_it_was() {
         assert_eq!(belief, before);
     }
     assert!(belief.mean().is_finite());
+}
+
+/// Issue: the grid filters refused noise-free dynamics.
+#[test]
+fn narrow_noise_and_none_are_followed() {
+    for (a, q) in [
+        (0.9, 0.0),
+        (-0.8, 0.0),
+        (1.0, 0.0),
+        (1.1, 1e-3),
+        (0.7, 0.01),
+        (0.0, 0.0),
+        (0.3, 0.005),
+    ] {
+        let (dynamics, mut rng) = (Ar1::new_unstable(a, q).unwrap(), Pcg64Mcg::seed_from_u64(1));
+        let (mut grid, mut exact) = (PointMassFilter::following(), MomentFilter);
+        let mut other = Gaussian::scalar(0.4, 2.0).unwrap();
+        let mut one = grid.start(&mut rng, &other).unwrap();
+        for z in [1.0, -0.5] {
+            let value = Value::scalar(z, 4.0).unwrap();
+            let seen: &dyn Likelihood<1> = &Observed::new(LinearSensor::direct(4.0).unwrap(), value);
+            grid.predict(&mut rng, &dynamics, &mut one).unwrap();
+            exact.predict(&mut rng, &dynamics, &mut other).unwrap();
+            let evidence = grid.update(&mut rng, &mut one, &[seen]).unwrap().log_likelihood;
+            let known = exact.update(&mut rng, &mut other, &[seen]).unwrap().log_likelihood;
+            assert!((evidence - known).abs() < 2e-6, "{a} {q}");
+            assert!((one.mean() - other.mean()[0]).abs() < 2e-6, "{a} {q}");
+            assert!((one.variance() - other.covariance()[0]).abs() < 2e-5, "{a} {q}");
+        }
+    }
 }

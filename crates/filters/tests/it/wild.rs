@@ -1,7 +1,7 @@
 //! Wild arguments: every step returns a belief of numbers or an error, and an error leaves the belief as it was.
 
 use fewbits_core::factor::{Levels, Scalar, Value};
-use fewbits_core::{Cell, Gaussian, Likelihood, Link, Observed};
+use fewbits_core::{Belief, Cell, Gaussian, Likelihood, LinearSensing, Link, Observed};
 use fewbits_filters::{
     BootstrapFilter, GaussianCloud, Particles, PointMass, RaoBlackwellised, ResamplingRule, StateFilter,
     TransitionKernel, UniformGrid,

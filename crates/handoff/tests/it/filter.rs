@@ -1,7 +1,7 @@
 //! The filter against the Kalman filter, and what it refuses.
 
 use fewbits_core::factor::Value;
-use fewbits_core::{BitString, CodecError, Gaussian, Likelihood, Message, Observed};
+use fewbits_core::{Belief, BitString, CodecError, Gaussian, Likelihood, Message, Observed};
 use fewbits_densities::{Bandwidth, Mixture, Particles};
 use fewbits_handoff::{Coded, Components, HandoffFilter, Handover, RateLimited, Reducer, Whole, trimmed};
 use fewbits_mixture_codec::Reduction;

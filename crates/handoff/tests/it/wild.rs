@@ -2,7 +2,7 @@
 
 use fewbits_core::factor::Value;
 use fewbits_core::laws::wild;
-use fewbits_core::{Gaussian, Observed};
+use fewbits_core::{Belief, Gaussian, Observed};
 use fewbits_densities::{Mixture, Particles};
 use fewbits_handoff::{Components, HandoffFilter, Whole, trimmed};
 use fewbits_mixture_codec::plug_in::plug_in;

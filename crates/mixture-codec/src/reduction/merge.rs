@@ -1,6 +1,7 @@
 //! Reduction of mixtures by merging pairs of components; mean and covariance are kept.
 
 use crate::Error;
+use fewbits_core::Belief;
 use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::factored::{Factored, half_log_det};

@@ -97,6 +97,7 @@ impl<const D: usize> Clumps<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fewbits_core::Belief;
     use nalgebra::{SMatrix, SVector};
 
     /// One step of expectation-maximisation as the textbooks have it, and the mean log density before it.

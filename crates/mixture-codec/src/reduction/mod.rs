@@ -15,6 +15,7 @@ use crate::Error;
 use crate::plug_in::Cubature;
 use crate::tree::{Split, Tree};
 use cut::{Criterion, NodeErrors, greedy, optimal};
+use fewbits_core::Belief;
 use fewbits_densities::{Component, KernelEstimate, Mixture};
 use fewbits_numerics::error::at_least_one;
 use merge::{MergeCost, merge};
@@ -23,6 +24,7 @@ use serde::{Deserialize, Serialize};
 /// A method that reduces an estimate to a given number of components.
 ///
 /// ```
+/// use fewbits_core::Belief;
 /// use fewbits_mixture_codec::Reduction;
 /// use fewbits_densities::{Bandwidth, KernelEstimate, Particles};
 /// let x: Vec<f64> = (0..100).map(|i| (f64::from(i) * 0.7).sin() + f64::from(i % 2)).collect();

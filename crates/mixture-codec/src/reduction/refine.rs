@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::plug_in::Cubature;
 use crate::reduction::em::{Limits, Points, step};
+use fewbits_core::Belief;
 use fewbits_densities::{Component, KernelEstimate, Mixture};
 use fewbits_numerics::linalg::symmetrised;
 use nalgebra::SVector;

@@ -50,6 +50,7 @@ pub(crate) const MAX_COMPONENTS: usize = 63;
 /// A quantised mixture as a message. It equals what the receiver decodes, to the last bit.
 ///
 /// ```
+/// use fewbits_core::Belief;
 /// use fewbits_core::Message;
 /// use fewbits_mixture_codec::wire::{CodedMixture, WireFormat};
 /// use fewbits_densities::{Component, Mixture};

@@ -2,7 +2,7 @@
 
 use super::format::WireFormat;
 use super::range::{Coder, Law, MAX_SYMBOL, Reader, out_of_range};
-use fewbits_core::CodecError;
+use fewbits_core::{Belief, CodecError};
 use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::factored::Factored;
 use nalgebra::{SMatrix, SVector};

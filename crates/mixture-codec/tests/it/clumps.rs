@@ -1,5 +1,6 @@
 //! Clumps and the mixtures fitted to them.
 
+use fewbits_core::Belief;
 use fewbits_mixture_codec::{Clumps, MixtureFit};
 use fewbits_numerics::eigen::symmetric_eigen;
 use nalgebra::{SMatrix, SVector};

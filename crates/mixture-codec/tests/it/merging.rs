@@ -1,6 +1,7 @@
 //! Merging against its definitions: every pair priced anew by closed forms.
 
 use crate::common::random_mixture;
+use fewbits_core::Belief;
 use fewbits_densities::{Component, Mixture};
 use fewbits_mixture_codec::merge::{MergeCost, merge};
 use fewbits_monte_carlo::Stream;

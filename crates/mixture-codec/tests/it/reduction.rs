@@ -2,6 +2,7 @@
 
 use crate::common::{crescent, d1_scaled, random_mixture};
 use fewbits_baselines::mixture_codec::quadrature::integrated;
+use fewbits_core::Belief;
 use fewbits_densities::{Bandwidth, Component, KernelEstimate, Mixture, Particles};
 use fewbits_mixture_codec::cut::{Cut, greedy, greedy_within, optimal};
 use fewbits_mixture_codec::merge::{MergeCost, merge};

@@ -1,7 +1,7 @@
 //! The wire format: golden bytes, resolution, totality, rate control.
 
 use crate::common::{crescent, lobe, random_mixture};
-use fewbits_core::{BitReader, BitString, Message, laws};
+use fewbits_core::{Belief, BitReader, BitString, Message, laws};
 use fewbits_densities::{Component, Mixture};
 use fewbits_mixture_codec::plug_in::cubature;
 use fewbits_mixture_codec::wire::{CodedMixture, FORMAT, RateControl, WireFormat};

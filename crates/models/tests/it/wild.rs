@@ -1,6 +1,6 @@
 //! Wild arguments: every constructor and step of this crate returns numbers or an error.
 
-use fewbits_core::{Dynamics, GaussianDynamics, Sensing};
+use fewbits_core::{Dynamics, GaussianDynamics, LinearSensing, Sensing};
 use fewbits_models::{
     Ar1, Bearing, LinearGaussian, LinearSensor, LogDistance, ReceivedPower, constant_velocity_1d, constant_velocity_2d,
 };

@@ -6,7 +6,7 @@ use fewbits_baselines::dymbo::centre::ScalarEstimator;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_core::factor::Value;
-use fewbits_core::{Gaussian, Likelihood, Link, NumberFormat, Observation, Observed, SensorNode, Sign};
+use fewbits_core::{Belief, Gaussian, Likelihood, Link, NumberFormat, Observation, Observed, SensorNode, Sign};
 use fewbits_densities::Mixture;
 use fewbits_diffusive::{RateModel, RateRange, Search, SearchBox, SearchField, SourceChain, SourceSensor, Status};
 use fewbits_dymbo::{CountFusion, DymboFilter, MultibitFilter, ParallelFilter, ScalarFilter};

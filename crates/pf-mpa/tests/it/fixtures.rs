@@ -9,7 +9,7 @@ use fewbits_baselines::pf_mpa::{
 };
 use fewbits_baselines::pf_mpa::{LabelChain, RingBias, kernel_error, ratio_second_moments};
 use fewbits_core::factor::Factor;
-use fewbits_core::{Gaussian, NumberFormat, Observed};
+use fewbits_core::{Belief, Gaussian, NumberFormat, Observed};
 use fewbits_densities::{Bandwidth, BandwidthRule, Component, Mixture};
 use fewbits_filters::StateFilter;
 use fewbits_monte_carlo::Stream;

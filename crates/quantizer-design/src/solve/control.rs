@@ -59,7 +59,6 @@ pub(super) struct Control<'a> {
     progress: Option<&'a mut Watch<'a>>,
     /// Stage, finished parts and parts of the last report.
     last: (Stage, usize, usize),
-    is_stopped: bool,
     pub(super) is_cut_short: bool,
     pub(super) steps: usize,
 }
@@ -77,7 +76,6 @@ impl<'a> Control<'a> {
             portion: 1.0,
             progress,
             last: (Stage::SingleSensors, 0, 1),
-            is_stopped: false,
             is_cut_short: false,
             steps: 0,
         }
@@ -106,16 +104,13 @@ impl<'a> Control<'a> {
 
     /// The end of the present part.
     pub(super) fn deadline(&self) -> Deadline {
-        if self.is_stopped {
-            return Deadline::over(self.clock);
-        }
         self.deadline
     }
 
     /// Whether time is left in the present part, and the caller has not stopped the search.
     pub(super) fn go_on(&mut self) -> bool {
         self.tell();
-        let is_over = self.is_stopped || self.deadline.is_over();
+        let is_over = self.deadline.is_over();
         self.is_cut_short |= is_over;
         !is_over
     }
@@ -131,20 +126,19 @@ impl<'a> Control<'a> {
         self.tell();
     }
 
+    /// Tells the caller; if it stops the search, no time is left.
     fn tell(&mut self) {
         let ((stage, done, parts), elapsed) = (self.last, self.elapsed());
-        if self.is_stopped {
-            return;
-        }
-        if let Some(progress) = &mut self.progress {
-            let now = Progress {
-                stage,
-                done,
-                parts,
-                elapsed,
-            };
-            self.is_stopped = progress(now).is_break();
-            self.is_cut_short |= self.is_stopped;
+        let now = Progress {
+            stage,
+            done,
+            parts,
+            elapsed,
+        };
+        if self.progress.as_mut().is_some_and(|progress| progress(now).is_break()) {
+            (self.progress, self.limit, self.speed) = (None, Some(Duration::ZERO), 0.0);
+            self.deadline = Deadline::after(self.clock, self.started, self.limit, self.speed);
+            self.is_cut_short = true;
         }
     }
 }

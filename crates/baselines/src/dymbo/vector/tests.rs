@@ -1,7 +1,7 @@
 //! The filter of vector states against Kalman filters, assumed-density updates and the scalar filters.
 
 use super::SignFilter;
-use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
+use fewbits_core::{Gaussian, LinearSensing, Link, Observation, Scheme, Sign};
 use fewbits_dymbo::{CountFusion, DymboFilter, Error, ParallelFilter, ScalarFilter, ScalarPlant, SignBit};
 use fewbits_filters::{assumed_density, kalman};
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, ScalarSensor};
