@@ -2,7 +2,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `rows`, `columns`, `own_columns`, `seconds` | the table as a source of rows, which of its columns are no sensors, its times |
+//! | `rows`, `columns`, `own_columns`, `accuracies`, `seconds` | the table as a source of rows, which of its columns are no sensors, what accuracies state, its times |
 //! | `report` | first cell of a row, summary |
 //! | `level`, `level_options`, `picture` | the task `track`: a sheet of a level, its options, its picture |
 //! | `range_rows`, `range_options`, `path` | the task `ranges`: a sheet of places, its options, its picture |

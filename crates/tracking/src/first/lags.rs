@@ -21,6 +21,8 @@ const FEWEST: usize = 160;
 const MOST: usize = 32;
 /// Share of the weight of a value that is lost from row to row, as a logarithm: least and most.
 const QUICK: [f64; 2] = [0.02, 3.0];
+/// The level is known by the others within so many rows of their values.
+const NEAR: usize = 8;
 /// The squares are smaller by so many standard errors of their mean. Of a sensor that is on time they are larger, the more the level moves.
 const SURELY: f64 = 4.0;
 
@@ -47,11 +49,15 @@ fn others(rows: &[Instant], sensor: usize, noises: &[f64], change: f64) -> Vec<O
     let before: Vec<[f64; 2]> = own.iter().scan([0.0; 2], add).collect();
     let mut after: Vec<[f64; 2]> = own.iter().rev().scan([0.0; 2], add).collect();
     after.reverse();
-    let level = |((before, after), own): ((&[f64; 2], &[f64; 2]), &[f64; 2])| {
-        let [sum, weight] = [0, 1].map(|i| before[i] + after[i] - own[i]);
-        (weight > 0.0).then(|| sum / weight)
+    let is_near = |row: usize| {
+        let near = &own[row.saturating_sub(NEAR)..own.len().min(row + NEAR + 1)];
+        near.iter().any(|sums| sums[1] > 0.0)
     };
-    before.iter().zip(&after).zip(&own).map(level).collect()
+    let level = |row: usize| {
+        let [sum, weight] = [0, 1].map(|i| before[row][i] + after[row][i] - own[row][i]);
+        (weight > 0.0 && is_near(row)).then(|| sum / weight)
+    };
+    (0..own.len()).map(level).collect()
 }
 
 /// How many standard errors the squares are smaller if the others are `lag` rows before.

@@ -1,6 +1,7 @@
 //! What is found from the first rows: prior, change, noise of each sensor, steps of rounding.
 
 use crate::error::Error;
+use crate::first::lasting::lasting;
 use crate::first::limits::Ends;
 use crate::first::rounding;
 use crate::first::values::{steepest, values, values_of};
@@ -305,9 +306,11 @@ impl Settings {
         let is_found = found.is_ok();
         if let Ok(mut found) = found {
             self.take(found.clone(), unknown);
-            // A slope may show in more rows only: then differences from the forecasts of a walk last.
-            let lasts = |test: &SensorTest| test.repetition > REPEATING;
-            if self.may_slope && self.tests(&readings_of_more, names).iter().any(lasts) {
+            // A slope may show in more rows only: then differences from the forecasts of a walk keep a direction.
+            let lasts = |test: &SensorTest| test.repetition > REPEATING || test.is_persistent();
+            let is_sloping = self.may_slope && self.tests(&readings_of_more, names).iter().any(lasts);
+            // A sensor that is slow makes a walk smooth.
+            if is_sloping && lasting(more, names.len()).is_none() {
                 self.compare_slope(&mut found, &readings_of_more, (change, &noises), unknown);
                 self.take(found, unknown);
             }
