@@ -16,6 +16,15 @@ pub struct Predictions {
     weights: Vec<f64>,
 }
 
+/// Lower and upper bound, nats.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// Lower bound.
+    pub lower: f64,
+    /// Upper bound.
+    pub upper: f64,
+}
+
 /// Spacing of the two-dimensional quadrature rule, in noise standard deviations.
 const SPACING: f64 = 0.4;
 const REACH: f64 = 8.0;
@@ -51,11 +60,11 @@ impl Predictions {
         }
     }
 
-    /// `-sum_i w_i ln sum_j w_j exp(-D_ij / 8)`, `D_ij` the squared distance of predictions in noise standard deviations: a lower bound of
-    /// the mutual information, nats (Kolchinsky and Tracey 2017).
-    pub fn pairwise_bound(&self) -> f64 {
+    /// `-sum_i w_i ln sum_j w_j exp(-D_ij / 8)` and the same with `D_ij / 2`, `D_ij` the squared distance of predictions in noise
+    /// standard deviations (Kolchinsky and Tracey 2017): bounds of the mutual information, nats.
+    pub fn pairwise_bounds(&self) -> Bounds {
         let weights = &self.weights;
-        let mut sums = weights.clone();
+        let mut inner = [weights.clone(), weights.clone()];
         let (mut exponents, mut overlaps) = (vec![0.0; weights.len()], vec![0.0; weights.len()]);
         for i in 1..weights.len() {
             let (exponents, overlaps) = (&mut exponents[..i], &mut overlaps[..i]);
@@ -67,13 +76,24 @@ impl Predictions {
                 }
             }
             kernels::exp_minus(exponents, 0.0, overlaps);
-            for (j, overlap) in overlaps.iter().enumerate() {
-                sums[i] += weights[j] * overlap;
-                sums[j] += weights[i] * overlap;
+            for (j, eighth) in overlaps.iter().enumerate() {
+                // exp(-D / 2) is the fourth power of exp(-D / 8).
+                let half = (eighth * eighth) * (eighth * eighth);
+                for (sums, overlap) in inner.iter_mut().zip([*eighth, half]) {
+                    sums[i] += weights[j] * overlap;
+                    sums[j] += weights[i] * overlap;
+                }
             }
         }
-        let terms = weights.iter().zip(&sums).filter(|(w, _)| **w > 0.0);
-        -terms.map(|(w, sum)| w * sum.ln()).sum::<f64>()
+        let [lower, upper] = inner.map(|sums| {
+            -self
+                .weights
+                .iter()
+                .zip(&sums)
+                .map(|(w, sum)| if *w > 0.0 { w * sum.ln() } else { 0.0 })
+                .sum::<f64>()
+        });
+        Bounds { lower, upper }
     }
 
     fn covariance(&self) -> DMatrix<f64> {

@@ -92,7 +92,7 @@ impl Selector {
                 -d.dot(&(self.precision * d))
             }
             SelectionRule::MutualInformation => self.information(sensor, &receptor),
-            SelectionRule::PairwiseInformation => self.predictions(sensor, &receptor).pairwise_bound(),
+            SelectionRule::PairwiseInformation => self.predictions(sensor, &receptor).pairwise_bounds().lower,
             SelectionRule::ExactInformation => self.predictions(sensor, &receptor).exact(),
             SelectionRule::CramerRao => self.cramer_rao(sensor, &receptor),
             SelectionRule::Covariance => -self.covariance(sensor, &receptor).ln(),

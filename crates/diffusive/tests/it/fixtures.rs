@@ -175,7 +175,10 @@ fn mutual_information() {
         .for_each(|e| check(e, &[predictions(e).exact()]));
     entries("mi_kt_lower")
         .iter()
-        .for_each(|e| check(e, &[predictions(e).pairwise_bound()]));
+        .for_each(|e| check(e, &[predictions(e).pairwise_bounds().lower]));
+    entries("mi_kt_upper")
+        .iter()
+        .for_each(|e| check(e, &[predictions(e).pairwise_bounds().upper]));
 }
 
 #[test]
