@@ -106,3 +106,42 @@ impl RangeTracker {
         Ok(self.residuals[self.number(anchor)?].lasting())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ranges::{RangeSettings, Travel};
+    use nalgebra::Vector3;
+
+    /// A density of `n` lengths is `1000^-n` of its value when lengths are stated in a unit of a thousandth. Defect: ranges of three anchors, which
+    /// leave a curve of places, had no evidence, so that a wrong height under which anchors contradict each other seemed to explain them best.
+    #[test]
+    fn the_evidence_of_ranges_is_a_density() {
+        let places = [[0.0, 0.0], [12.0, 1.0], [4.0, 9.0], [13.0, 11.0], [-2.0, 6.0]];
+        for anchors in [3, 5] {
+            let gained = |unit: f64| {
+                let anchor = |i: usize| unit * Vector3::new(places[i][0], places[i][1], 0.0);
+                let named = (0..anchors).map(|i| (i.to_string(), anchor(i)));
+                let mut tracker = RangeTracker::new(named, Travel::Full, RangeSettings::default())
+                    .unwrap()
+                    .rigid();
+                let mut first = None;
+                for k in 0..90 {
+                    let time = 0.2 * k as f64;
+                    let truth =
+                        unit * Vector3::new(6.0 + 3.0 * (0.3 * time).sin(), 4.0 + 2.0 * (0.2 * time).cos(), 0.0);
+                    let error = unit * 0.05 * (1.7 * k as f64).sin();
+                    let range = (truth - anchor(k % anchors)).norm() + error;
+                    tracker.push(time, &(k % anchors).to_string(), range).unwrap();
+                    first = first.or(tracker.log_evidence().map(|evidence| (k, evidence)));
+                }
+                let (from, evidence) = first.unwrap();
+                ((89 - from) as f64, tracker.log_evidence().unwrap() - evidence)
+            };
+            let ((ranges, metres), (_, millimetres)) = (gained(1.0), gained(1000.0));
+            let expected = -ranges * 1000.0_f64.ln();
+            let error = millimetres - metres - expected;
+            assert!(error.abs() < 1e-2, "{anchors} anchors: {metres} and {millimetres}, {expected} apart");
+        }
+    }
+}

@@ -348,7 +348,7 @@ impl RangeTracker {
                 }
             }
         });
-        weigh(next, &evidences);
+        let common = weigh(next, &evidences);
         next.append(&mut late);
         // Anchors that send ranges, but contradict each other so much that those that are left do not determine the position.
         count_contradictions(next, known.axes + 1, |other| last - heard[other] <= known.silence);
@@ -360,7 +360,7 @@ impl RangeTracker {
         if next.is_empty() {
             return Err(failed.unwrap_or(Error::Impossible));
         }
-        let taken = drop_improbable(next, known.negligible, spare);
+        let taken = common + drop_improbable(next, known.negligible, spare);
         if self.pushed.is_multiple_of(COMPARED) {
             merge_same(next, known.axes, spare);
             let is_carried = self.collected.values().any(|latest| latest.moved != [0.0; 3]);

@@ -78,12 +78,14 @@ impl Hypothesis {
 }
 
 /// Takes in the evidence of a range: for each hypothesis whether the ranges leave it undetermined, and `ln` of the evidence. An undetermined hypothesis
-/// can explain almost any range, so its evidence is evidence of little errors of the model: only much of it decides.
-pub(super) fn weigh(hypotheses: &mut [Hypothesis], evidences: &[(bool, f64)]) {
+/// can explain almost any range, so its evidence is evidence of little errors of the model: only much of it decides. Returns `ln` of the evidence that
+/// no weight has taken in, since it is common to all: that of a range that leaves all of them undetermined.
+pub(super) fn weigh(hypotheses: &mut [Hypothesis], evidences: &[(bool, f64)]) -> f64 {
     let most = evidences.iter().map(|(_, one)| *one).fold(f64::NEG_INFINITY, f64::max);
     let shares = shares_of(hypotheses);
-    let (mut sum, mut total) = (0.0, 0.0);
+    let (mut sum, mut total, mut all) = (0.0, 0.0, 0.0);
     for (share, (is_undetermined, log_evidence)) in shares.iter().zip(evidences) {
+        all += share * (log_evidence - most).exp();
         if !is_undetermined {
             sum += share * (log_evidence - most).exp();
             total += share;
@@ -98,7 +100,8 @@ pub(super) fn weigh(hypotheses: &mut [Hypothesis], evidences: &[(bool, f64)]) {
         for one in hypotheses {
             one.behind = (best - one.recent - UNDECIDED).max(0.0);
         }
-        return;
+        let common = most + all.ln();
+        return if common.is_finite() { common } else { 0.0 };
     }
     // The evidence of those that are determined, together.
     let others = most + (sum / total).ln();
@@ -116,6 +119,7 @@ pub(super) fn weigh(hypotheses: &mut [Hypothesis], evidences: &[(bool, f64)]) {
             one.settle(others, best);
         }
     }
+    0.0
 }
 
 /// Whether a hypothesis whose `ln` of the probability is so much that of the best one's is kept.
