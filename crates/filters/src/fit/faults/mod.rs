@@ -20,9 +20,9 @@ use crate::calibration::{Instant, Reading};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
-/// Nats by which a fault of bits explains the readings better, so that one of two is as certain as 99 in a hundred: of 150 sound tables one reached more.
+/// Nats by which a fault of bits explains the readings better, so that one of two is as certain as 99 in a hundred: of 350 sound tables two reached more.
 /// Of two independent tests at a boundary it would be 3.3. The number of sensors of bits is added as its logarithm.
-const CERTAIN: f64 = 2.6;
+const CERTAIN: f64 = 2.7;
 /// Readings or instants from which a fault is found, at least.
 const FEWEST: usize = 30;
 /// A screened point that is worse by more nats than this is not climbed from.
