@@ -39,13 +39,18 @@ pub(crate) fn digits(text: &str, at_most: usize) -> Option<(i64, usize, &str)> {
 /// The place of a word in a list of names, by three letters or more of it.
 fn named(word: &str, names: &str) -> Option<usize> {
     let word = word.trim_end_matches('.').to_lowercase();
-    names
-        .split('|')
-        .position(|name| word.len() >= 3 && name.starts_with(&word))
+    if word.len() < 3 {
+        return None;
+    }
+    names.split('|').position(|name| name.starts_with(&word))
 }
 
 /// The number of a month, from 0, by its name or three letters of it.
 pub(crate) fn month_named(word: &str) -> Option<usize> {
+    // Most words that are asked for are none, or parts of numbers.
+    if word.len() < 3 || !word.starts_with(char::is_alphabetic) {
+        return None;
+    }
     named(word, MONTHS).or_else(|| {
         let word = word.trim_end_matches('.').to_lowercase();
         let word = if word == "déc" || word.starts_with("décem") {

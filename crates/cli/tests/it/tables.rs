@@ -402,3 +402,22 @@ fn messages_do_not_repeat_long_names() {
     }
     assert!(text(&good(folder, &["look", "good.csv"], b"")).len() < 2000);
 }
+
+/// A column of numbers of another spelling came back as words, and nothing said so.
+#[test]
+fn words_that_begin_with_digits_are_told() {
+    let folder = folder(&[
+        ("lat.csv", "time,lat,state\n0,52°31'12\"N,3 on\n1,52°31'13\"N,off\n"),
+        ("codes.csv", "time,part,caller\n0,4k7,+491715550000\n1,5k7,+491715550001\n"),
+    ]);
+    let told = |file: &str| {
+        let output = fewbits(folder.path(), &["pack", file, "--time", "exact", "-o", "a.fewb"], b"");
+        text(&output.stderr)
+    };
+    let lat = told("lat.csv");
+    assert_eq!(lat.matches("is kept as words").count(), 1, "{lat}");
+    assert!(lat.contains("the column `lat` is kept as words, as `52°31'12\"N`"), "{lat}");
+    let codes = told("codes.csv");
+    assert!(!codes.contains("is kept as words"), "{codes}");
+    assert_eq!(codes.matches("`+491715550000` of the column `caller`").count(), 1, "{codes}");
+}
