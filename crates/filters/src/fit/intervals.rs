@@ -1,13 +1,12 @@
 //! Intervals of parameters in which the likelihood is no parabola.
 
 use super::errors::Spread;
-use super::parameters::{Estimate, Quantity};
+use super::parameters::{DEVIATIONS, Estimate, Quantity};
 use super::problem::{LONG, Problem};
 use fewbits_numerics::normal::cdf;
 use nalgebra::{DMatrix, DVector};
 
-/// Deviations of a normal number within which it is in 95 of a hundred cases, and nats that this is below the most.
-pub(super) const DEVIATIONS: f64 = 1.96;
+/// Nats by which the likelihood is below the most at the ends of an interval.
 const NATS: f64 = 0.5 * DEVIATIONS * DEVIATIONS;
 /// Share outside of an interval.
 const OUTSIDE: f64 = 0.05;

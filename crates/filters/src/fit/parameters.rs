@@ -1,8 +1,10 @@
 //! Parameters, and what is known of them.
 
-use super::intervals::DEVIATIONS;
 use super::model::LevelModel;
 use serde::{Deserialize, Serialize};
+
+/// Deviations of a normal number within which it is in 95 of a hundred cases.
+pub(super) const DEVIATIONS: f64 = 1.96;
 
 /// A parameter. Sensors are given by index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

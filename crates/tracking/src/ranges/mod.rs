@@ -22,7 +22,7 @@ use crate::rows::{Instants, Rows};
 use crate::text::short;
 use accuracies::Accuracies;
 use divisor::common_divisor;
-use fewbits_pf_mpa::{RangeEstimate, RangeSettings, RangeTracker, Travel};
+use fewbits_pf_mpa::{Height, Mistake, RangeEstimate, RangeSettings, RangeTracker, Travel};
 use mistakes::{FIRST_RANGES, limited, mended, mistake, proportion};
 use nalgebra::Vector3;
 use odometry::Odometry;
@@ -371,7 +371,15 @@ impl RangesTracker {
             || summary.anchors.iter().any(is_wrong)
             || summary.walking_biases.is_some();
         if is_suspect {
-            summary.mistake = mistake(&anchors, settings, &first);
+            // A height that was found from ranges of wrong tables would hide what is wrong with them.
+            let is_flat = anchors.iter().all(|(_, place)| place.z == anchors[0].1.z);
+            let is_found = options.height.is_none() && is_flat && matches!(settings.height, Height::Known(_));
+            let stated = RangeSettings {
+                height: if is_found { Height::Unsaid } else { settings.height },
+                ..settings
+            };
+            let is_taken = |mistake: &Mistake| is_found && matches!(mistake, Mistake::Height(_));
+            summary.mistake = mistake(&anchors, stated, &first).filter(|mistake| !is_taken(mistake));
             summary.hints.extend(summary.mistake.as_ref().and_then(mended));
         }
         let own = counts.rounding / 12.0_f64.sqrt();

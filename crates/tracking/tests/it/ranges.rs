@@ -1,7 +1,7 @@
 //! A place from ranges.
 
 use crate::{Normal, rows};
-use fewbits_tracking::{Error, Instant, Instants, RangesOptions, RangesTracker};
+use fewbits_tracking::{Error, Instant, Instants, Mistake, RangesOptions, RangesTracker};
 use nalgebra::Vector3;
 
 const NAMES: [&str; 4] = ["a", "b", "c", "d"];
@@ -76,4 +76,37 @@ fn sensor_that_is_no_anchor_is_refused() {
     let mut rows = Instants::listed(["a", "x"], table);
     let refused = RangesTracker::new(&RangesOptions::default(), &anchors(), &mut rows).err();
     assert!(matches!(refused, Some(Error::Unknown { name }) if name == "x"));
+}
+
+/// Ranges of places whose anchors the table exchanges may also look like those of a target that is higher.
+#[test]
+fn exchanged_anchors_are_no_height() {
+    let places = [[0.7, 0.5], [14.0, 1.1], [12.7, 9.0], [-0.9, 9.4], [7.4, 1.3]].map(|[x, y]| Vector3::new(x, y, 0.0));
+    let names = ["a", "b", "c", "d", "e"];
+    let options = RangesOptions {
+        looks_ahead: true,
+        ..RangesOptions::default()
+    };
+    let mut heights = 0;
+    for seed in [2, 4_u32] {
+        let mut normal = Normal(u64::from(seed));
+        let cells = |k: u32| {
+            let turn = 0.002 * f64::from((seed + 3) * k);
+            let target = Vector3::new(7.0 + 4.2 * turn.cos(), 4.9 + 2.8 * (1.37 * turn).sin(), 0.0);
+            let range = |anchor: &Vector3<f64>| Some((anchor - target).norm() + 0.2 + NOISE * normal.next());
+            places.iter().map(range).collect::<Vec<_>>()
+        };
+        let cells: Vec<_> = (0..300).map(cells).collect();
+        let mut anchors: Vec<(String, Vector3<f64>)> = names.map(str::to_owned).into_iter().zip(places).collect();
+        (anchors[1].1, anchors[4].1) = (places[4], places[1]);
+        let mut rows = Instants::listed(names, rows(cells));
+        let mut tracker = RangesTracker::new(&options, &anchors, &mut rows).unwrap();
+        while let Some(instant) = rows.next().unwrap() {
+            tracker.step(rows.names(), &instant).unwrap();
+        }
+        let summary = tracker.finish(&rows).unwrap();
+        heights += usize::from(summary.hints.iter().any(|hint| hint.contains("higher or lower")));
+        assert_eq!(summary.mistake, Some(Mistake::Swapped("b".to_owned(), "e".to_owned())), "{:?}", summary.hints);
+    }
+    assert_eq!(heights, 2, "these ranges look like those of a height too");
 }
