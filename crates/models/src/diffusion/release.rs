@@ -1,7 +1,8 @@
 //! Releases whose rate changes with time.
 
+use super::integrate::over_ages;
 use crate::Error;
-use fewbits_numerics::error::{all_finite, refuse};
+use fewbits_numerics::error::{all_finite, positive, refuse};
 
 /// A release rate that is constant between given instants, and zero before the first and after the last.
 ///
@@ -62,5 +63,26 @@ impl Release {
             .map(|(rate, edge)| rate * (since(edge[0]) - since(edge[1])))
             .sum::<f64>()
             .max(0.0)
+    }
+
+    /// Concentration (kg/m^3) at `time` (s) of any rate `mu(t)` (kg/s) that began at `start`. `impulse(age)` is the impulse response.
+    /// Diffusivity and distance bound the ages at which it is not negligible. Quadrature in `age^(-1/2)`; relative accuracy about 1e-12 if
+    /// the rate is smooth.
+    ///
+    /// # Errors
+    /// If `diffusivity` or `distance` is not a positive number.
+    pub fn varying(
+        rate: impl Fn(f64) -> f64,
+        start: f64,
+        time: f64,
+        (diffusivity, distance): (f64, f64),
+        impulse: impl Fn(f64) -> f64,
+    ) -> Result<f64, Error> {
+        positive("diffusivity", diffusivity)?;
+        positive("distance", distance)?;
+        if time <= start {
+            return Ok(0.0);
+        }
+        Ok(over_ages(diffusivity, distance, time - start, |age| rate(time - age) * impulse(age)))
     }
 }

@@ -1,6 +1,6 @@
 //! Laws of the Green's functions: mass, reciprocity, walls, and closed forms against quadrature.
 
-use fewbits_models::diffusion::{Air, Axis, Flux, Ground, ImpulseResponse, Space, Wall, step_response};
+use fewbits_models::diffusion::{Air, Axis, Flux, Ground, ImpulseResponse, Release, Space, Wall, step_response};
 use fewbits_numerics::quadrature::Rule;
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -141,6 +141,23 @@ fn released_mass_is_in_the_half_space() {
         TAU * r * r * air.concentration(&Vector3::new(r, 0.0, 0.0), &Vector3::zeros(), age)
     });
     assert!((total / age - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_smooth_rate_between_its_steps() {
+    let air = Air::new(40.0, Vector3::zeros(), Ground::Impermeable).unwrap();
+    let (field, source) = (Vector3::new(10.0, 0.0, 0.0), Vector3::zeros());
+    let impulse = |age: f64| air.green(&field, &source, age);
+    let constant = Release::varying(|_| 1.0, 0.0, 20.0, (40.0, 10.0), impulse).unwrap();
+    assert!((constant / air.concentration(&field, &source, 20.0) - 1.0).abs() < 1e-11);
+    let ramp = Release::varying(|t| t, 0.0, 20.0, (40.0, 10.0), impulse).unwrap();
+    let steps = 4000;
+    let edges: Vec<f64> = (0..=steps).map(|i| 20.0 * i as f64 / steps as f64).collect();
+    let rates: Vec<f64> = edges.windows(2).map(|e| 0.5 * (e[0] + e[1])).collect();
+    let stepped = Release::piecewise(edges, rates)
+        .unwrap()
+        .concentration(20.0, |age| air.concentration(&field, &source, age));
+    assert!((ramp / stepped - 1.0).abs() < 1e-5);
 }
 
 #[test]

@@ -116,6 +116,40 @@ fn axes_and_spaces_say_what_they_are() {
     assert_eq!(windy(0.7).green(x, 0.4, 0.0), 0.0);
 }
 
+/// A varying rate is its first value, and every later change from its own instant on.
+#[test]
+fn a_varying_rate_is_a_sum_of_steps() {
+    for distance in [0.3, 2.9] {
+        let air = Air::new(1.4, Vector3::new(0.8, 0.1, 0.0), Ground::None).unwrap();
+        let (field, source) = (Vector3::new(distance, 0.0, 0.0), Vector3::zeros());
+        let step = |age: f64| air.concentration(&field, &source, age);
+        let (start, time) = (3.1, 9.7);
+        let rate = |t: f64| 1.7 + 0.4 * t - 0.03 * t * t;
+        let changes = Rule::gauss_legendre(40).composite(start, time, 200, |t| (0.4 - 0.06 * t) * step(time - t));
+        let want = rate(start) * step(time - start) + changes;
+        let calls = Cell::new(0);
+        let impulse = |age: f64| {
+            calls.set(calls.get() + 1);
+            air.green(&field, &source, age)
+        };
+        let got = Release::varying(rate, start, time, (1.4, distance), impulse).unwrap();
+        close(got, want, 1e-10);
+        assert!(calls.get() <= 1000, "{} evaluations", calls.get());
+        let at = |start, time| Release::varying(rate, start, time, (1.4, distance), impulse).unwrap();
+        assert_eq!([at(3.1, 3.1), at(3.1, 2.0), at(3.1, 3.1 + 1e-9)], [0.0; 3]);
+        assert!(Release::varying(rate, start, time, (0.0, distance), impulse).is_err());
+        assert!(Release::varying(rate, start, time, (1.4, -distance), impulse).is_err());
+        // A rate that is not a number is no reason to look for ever.
+        calls.set(0);
+        assert!(
+            Release::varying(|_| f64::NAN, start, time, (1.4, distance), impulse)
+                .unwrap()
+                .is_nan()
+        );
+        assert!(calls.get() <= 1000, "{} evaluations", calls.get());
+    }
+}
+
 #[test]
 fn piecewise_rates_are_boxes() {
     let growth = |age: f64| age * age;
