@@ -71,6 +71,6 @@ pub use leak::LeakBelief;
 pub use leak_prior::{LeakPrior, Reading};
 pub use plan::Plan;
 pub use steady::{Source, Steady};
-pub use transient::{Snapshot, StepControl, TimedSource, Transient};
+pub use transient::{Method, Snapshot, StepControl, TimedSource, Transient};
 pub use transport::{Balance, FluxRule, PerCell, Transport};
 pub use wind::{Divergence, PotentialFlow};

@@ -1,10 +1,20 @@
-//! One time step of a transport, with an error estimate: the trapezoidal rule, then a backward difference (TR-BDF2). It is of second order, with
-//! an embedded error estimate of third order, and damps the fast components that a sudden start excites. Its errors may make concentrations
-//! slightly negative; [`Snapshot::lowest`](crate::Snapshot::lowest) has the lowest.
+//! One time step of a transport, with an error estimate.
 
 use crate::solver::{Direction, Factor};
 use crate::{Error, Transport};
 use faer::{Mat, Scale};
+
+/// Method of a time step. Both damp the fast components that a sudden start excites.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// Trapezoidal rule, then a backward difference (TR-BDF2): second order, with an embedded error estimate of third order. Its errors may
+    /// make concentrations slightly negative; [`Snapshot::lowest`](crate::Snapshot::lowest) has the lowest.
+    #[default]
+    TrBdf2,
+    /// Two implicit Euler steps of half the length. The error estimate is their difference from one whole step. First order, never
+    /// negative.
+    ImplicitEuler,
+}
 
 /// Largest number of factorisations that are kept.
 const MAX_FACTORS: usize = 16;
@@ -22,6 +32,7 @@ const ERROR: [f64; 3] = [
 /// Makes time steps, and keeps the factors for the last step lengths.
 pub(crate) struct Stepper<'a> {
     pub(crate) transport: &'a Transport,
+    pub(crate) method: Method,
     /// Factors by their coefficient of `A`; the last used comes last.
     factors: Vec<(f64, Factor<'a>)>,
 }
@@ -30,6 +41,7 @@ impl<'a> Stepper<'a> {
     pub(crate) fn new(transport: &'a Transport) -> Self {
         Self {
             transport,
+            method: Method::default(),
             factors: Vec::new(),
         }
     }
@@ -48,27 +60,43 @@ impl<'a> Stepper<'a> {
             factor.solve(direction, &mut columns);
             columns
         };
-        let weight = HALF_GAMMA * step;
-        let factor = self.factor(weight)?;
-        let slope = |c: &Mat<f64>| {
-            let mut out = Mat::zeros(c.nrows(), c.ncols());
-            for j in 0..c.ncols() {
-                transport.apply(direction, c.col_as_slice(j), out.col_as_slice_mut(j));
+        match self.method {
+            Method::ImplicitEuler => {
+                let euler = |from: &Mat<f64>, step: f64, factor: &Factor<'_>| {
+                    solved(factor, amounts(from) + Scale(step) * source)
+                };
+                let whole = euler(now, step, self.factor(step)?);
+                let half_factor = self.factor(0.5 * step)?;
+                let middle = euler(now, 0.5 * step, half_factor);
+                let next = euler(&middle, 0.5 * step, half_factor);
+                let dose = Scale(0.5 * step) * (middle + &next);
+                let error = relative_error(&(&next - whole), &next);
+                Ok((next, dose, error))
             }
-            source - out
-        };
-        let first = slope(now);
-        let middle = solved(factor, amounts(now) + Scale(weight) * (&first + source));
-        let second = slope(&middle);
-        let slopes = Scale(step * WEIGHT) * (&first + &second) + Scale(weight) * source;
-        let next = solved(factor, amounts(now) + slopes);
-        let third = slope(&next);
-        // One more solution with the matrix keeps the estimate bounded for stiff components.
-        let error = Scale(ERROR[0]) * first + Scale(ERROR[1]) * second + Scale(ERROR[2]) * third;
-        let error = solved(factor, Scale(step) * error);
-        let dose = Scale(step * WEIGHT) * (now + middle) + Scale(weight) * &next;
-        let error = relative_error(&error, &next);
-        Ok((next, dose, error))
+            Method::TrBdf2 => {
+                let weight = HALF_GAMMA * step;
+                let factor = self.factor(weight)?;
+                let slope = |c: &Mat<f64>| {
+                    let mut out = Mat::zeros(c.nrows(), c.ncols());
+                    for j in 0..c.ncols() {
+                        transport.apply(direction, c.col_as_slice(j), out.col_as_slice_mut(j));
+                    }
+                    source - out
+                };
+                let first = slope(now);
+                let middle = solved(factor, amounts(now) + Scale(weight) * (&first + source));
+                let second = slope(&middle);
+                let slopes = Scale(step * WEIGHT) * (&first + &second) + Scale(weight) * source;
+                let next = solved(factor, amounts(now) + slopes);
+                let third = slope(&next);
+                // One more solution with the matrix keeps the estimate bounded for stiff components.
+                let error = Scale(ERROR[0]) * first + Scale(ERROR[1]) * second + Scale(ERROR[2]) * third;
+                let error = solved(factor, Scale(step) * error);
+                let dose = Scale(step * WEIGHT) * (now + middle) + Scale(weight) * &next;
+                let error = relative_error(&error, &next);
+                Ok((next, dose, error))
+            }
+        }
     }
 
     /// The factor of `V + weight A`.

@@ -1,5 +1,7 @@
 //! Concentrations that change with time.
 
+pub use crate::stepper::Method;
+
 use crate::solver::Direction;
 use crate::stepper::{State, Stepper};
 use crate::{Error, Patch, Transport};
@@ -78,6 +80,13 @@ impl<'a> Transient<'a> {
             stepper: Stepper::new(transport),
             control: StepControl::default(),
         }
+    }
+
+    /// The same solver with another method.
+    #[must_use]
+    pub fn with_method(mut self, method: Method) -> Self {
+        self.stepper.method = method;
+        self
     }
 
     /// The same solver with another step control.

@@ -70,7 +70,7 @@ impl From<Vec<f64>> for PerCell {
 /// ```
 ///
 /// The columns of `A` sum to what leaves the domain and decays, so mass is conserved to rounding. Off-diagonal entries are not positive and
-/// column sums not negative. Therefore steady solutions are never negative.
+/// column sums not negative. Therefore steady solutions and implicit Euler steps are never negative.
 pub struct Transport {
     domain: Arc<Domain>,
     pub(crate) volumes: Vec<f64>,

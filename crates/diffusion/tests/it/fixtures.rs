@@ -1,7 +1,7 @@
 //! Reference values by finite elements and series (`fixtures/geometry.json`): tolerances, orders, extrapolated values.
 
 use crate::cases::{Model, errors, fixture};
-use fewbits_diffusion::{FluxRule, StepControl, TimedSource, Transient};
+use fewbits_diffusion::{FluxRule, Method, StepControl, TimedSource, Transient};
 use serde_json::Value;
 
 const SCHEMES: [(FluxRule, &str); 2] = [(FluxRule::ExponentialFitting, "exp"), (FluxRule::Upwind, "upwind")];
@@ -167,4 +167,17 @@ fn sharper_time_steps_change_little() {
             .fold(0.0, f64::max);
         assert!(difference < 2e-4 * peak, "{}: {difference} of {peak}", coarse.time);
     }
+    let mut euler = Transient::new(&model.transport)
+        .with_method(Method::ImplicitEuler)
+        .with_control(StepControl::Tolerance(1e-3))
+        .unwrap();
+    let crude = euler.run(&initial, &[release(60.0)], &[30.0]).unwrap();
+    let peak = fine[0].concentration.iter().copied().fold(0.0, f64::max);
+    let difference = crude[0]
+        .concentration
+        .iter()
+        .zip(&fine[0].concentration)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max);
+    assert!(difference < 0.05 * peak && crude[0].lowest == 0.0, "{difference} of {peak}");
 }
